@@ -1,0 +1,2 @@
+//! gs-server
+fn main() {}
