@@ -1,0 +1,157 @@
+//! What operators want, and what the engine says to it.
+
+use protocol::{KeyId, Telecommand};
+
+use crate::clock::UtcUs;
+use crate::id::{CommandId, DownloadId, IntentId, LinkId, Principal, SatelliteId};
+use crate::record::Gate;
+
+/// An intent with who, and the key under which it counts only once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntentEnvelope {
+    /// Chosen by the shell; comes back with the answer.
+    pub id: IntentId,
+    /// Who wants it.
+    pub principal: Principal,
+    /// With the principal, unique for ever. The shell looks it up before it asks the engine.
+    pub idempotency_key: String,
+    /// SHA-256 of the request, so that the same key with another request is noticed.
+    pub digest: [u8; 32],
+    /// What is wanted.
+    pub intent: Intent,
+}
+
+/// What an operator may want.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Intent {
+    /// Send a telecommand.
+    Command(CommandIntent),
+    /// Withdraw a telecommand that has not been radiated.
+    Cancel(CommandId),
+    /// Bring the satellite's image home.
+    Download {
+        /// From whom.
+        satellite: SatelliteId,
+        /// Over what; the satellite's only link when `None`.
+        link: Option<LinkId>,
+    },
+    /// Withdraw a download.
+    CancelDownload(DownloadId),
+    /// I have looked: the clock of this machine is right. Holds until the process ends.
+    VouchClock,
+    /// I know why counter and witness disagree: go on above the higher of them.
+    ConfirmCounter(KeyId),
+    /// Let a link transmit, or not.
+    ArmLink {
+        /// Which.
+        link: LinkId,
+        /// Whether it may transmit.
+        armed: bool,
+    },
+}
+
+/// A telecommand that somebody wants sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommandIntent {
+    /// To whom.
+    pub satellite: SatelliteId,
+    /// Over what; the satellite's only link when `None`.
+    pub link: Option<LinkId>,
+    /// What.
+    pub telecommand: Telecommand,
+    /// Higher goes first; 0 is usual.
+    pub priority: i16,
+    /// When it may be radiated.
+    pub gate: Gate,
+    /// Not radiated after this.
+    pub expires_at: Option<UtcUs>,
+    /// How often an idempotent command may be radiated; `None` for the engine's default. Others: once.
+    pub attempts_allowed: Option<u16>,
+    /// The name of the command, typed again: required where the command is critical.
+    pub confirmation: Option<String>,
+}
+
+/// What became of an intent; durable before it is told.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Accepted {
+    /// The command that was queued.
+    Command(CommandId),
+    /// The command that was withdrawn.
+    Cancelled(CommandId),
+    /// The download that was ordered (or was active already).
+    Download(DownloadId),
+    /// The download that was withdrawn.
+    DownloadCancelled(DownloadId),
+    /// Done; there is nothing to point at.
+    Done,
+}
+
+/// The durable trace of an accepted intent, in the same batch as what it caused.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntentReceipt {
+    /// Who.
+    pub principal: Principal,
+    /// Under which key.
+    pub idempotency_key: String,
+    /// SHA-256 of the request.
+    pub digest: [u8; 32],
+    /// What became of it.
+    pub accepted: Accepted,
+    /// When.
+    pub at: UtcUs,
+}
+
+/// Why an intent was refused. Nothing was stored and nothing will be sent.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// No such satellite in the configuration.
+    #[error("satellite: '{0}' is not in the configuration")]
+    UnknownSatellite(String),
+    /// No such link, or it does not serve the satellite.
+    #[error("link: '{0}' is not a link of this satellite")]
+    UnknownLink(String),
+    /// No such command.
+    #[error("command {0} does not exist, or ended long ago")]
+    UnknownCommand(CommandId),
+    /// No such download.
+    #[error("download {0} does not exist, or has ended")]
+    UnknownDownload(DownloadId),
+    /// No such key.
+    #[error("key {0} is not in the configuration")]
+    UnknownKey(KeyId),
+    /// The satellite has no key: it can be heard, not commanded.
+    #[error("satellite '{0}' has no key in the configuration: it can be heard, not commanded")]
+    NoKey(SatelliteId),
+    /// An argument is out of its range.
+    #[error("arguments: {0}")]
+    Argument(String),
+    /// The profile of the satellite does not have this packet.
+    #[error("{0} is not in this satellite's profile")]
+    NotInProfile(&'static str),
+    /// Critical, and its name was not typed again.
+    #[error("{0} is critical: give its name in 'confirm' to fire it")]
+    NeedsConfirmation(&'static str),
+    /// It was or may have been radiated.
+    #[error("command {command} is {stage}: only what was not radiated can be withdrawn")]
+    TooLate {
+        /// Which.
+        command: CommandId,
+        /// Where it stands.
+        stage: &'static str,
+    },
+    /// Its time is over already.
+    #[error("expires_at lies in the past")]
+    AlreadyExpired,
+    /// The queue of this satellite is full.
+    #[error("{0} commands wait already: cancel some, or wait")]
+    QueueFull(usize),
+    /// The database does not take anything at present.
+    #[error("storage is failing: nothing is accepted until it recovers ({0})")]
+    Storage(String),
+    /// Nothing is locked for this key.
+    #[error("sealing with key {0} is not locked")]
+    NotLocked(KeyId),
+    /// The station is shutting down.
+    #[error("the station is stopping")]
+    Stopping,
+}
