@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# Installs what a clean Debian or Ubuntu machine lacks, and nothing that is there already.
+#
+#   scripts/setup.sh compiler                what scripts/demo needs
+#   scripts/setup.sh compiler python tools cargo-tools     what scripts/test needs (also: scripts/setup.sh all)
+#
+# Rust is presupposed; everything else is named here, each package where it is needed.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# Versions that were tried with our toolchain; a newer one may want a newer Rust.
+NEXTEST_VERSION=0.9.151
+DENY_VERSION=0.20.2
+CRYPTOGRAPHY_VERSION=46
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+fail() { say "$*"; exit 1; }
+have() { command -v "$1" >/dev/null 2>&1; }
+
+apt_index_is_fresh=no
+
+# install PACKAGE... with apt-get, through sudo when we are not root.
+install_packages() {
+  local as_root=()
+  have apt-get || fail "this machine has no apt-get; please install these Debian packages or their like by hand: $*"
+  if [ "$(id -u)" -ne 0 ]; then
+    have sudo || fail "cannot install $*: you are not root and there is no sudo; please run: apt-get install $*"
+    as_root=(sudo)
+  fi
+  say "installing $*"
+  if [ "$apt_index_is_fresh" = no ]; then
+    ${as_root[@]+"${as_root[@]}"} apt-get update -qq >&2 || say "apt-get update failed; trying with the package list that is here"
+    apt_index_is_fresh=yes
+  fi
+  ${as_root[@]+"${as_root[@]}"} env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >&2 \
+    || fail "apt-get could not install $*; please install it by hand and try again"
+}
+
+rust() {
+  have cargo || [ ! -x "${CARGO_HOME:-$HOME/.cargo}/bin/cargo" ] || PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+  have cargo || fail "there is no cargo: install Rust $(rust_version) or newer (rustup.rs, or your distribution) and try again"
+}
+
+rust_version() { sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml; }
+
+# The bundled SQLite and ring are C: a compiler, a linker and the C library's headers.
+compiler() {
+  rust
+  local c_program='#include <stdlib.h>
+int main(void) { return 0; }'
+  printf '%s\n' "$c_program" | cc -x c - -o /dev/null 2>/dev/null || install_packages build-essential # gcc, libc6-dev
+}
+
+# scripts/vectors.py makes the test vectors with another language's libraries, in .venv.
+python() {
+  python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages python3 python3-venv
+  if ! .venv/bin/python -c 'import cryptography' 2>/dev/null; then
+    say "making .venv with cryptography"
+    python3 -m venv --clear .venv || fail "python3 could not make .venv"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check "cryptography>=$CRYPTOGRAPHY_VERSION" \
+      || fail "pip could not install the Python package cryptography into .venv"
+  fi
+}
+
+# End-to-end tests watch system calls and speak HTTP from outside.
+tools() {
+  have strace || install_packages strace
+  have curl || install_packages curl ca-certificates
+}
+
+# install_cargo_tool CRATE VERSION: builds it when it is not in the path. Its artefacts stay out of our target folder.
+install_cargo_tool() {
+  have "$1" && return
+  say "building $1 $2 once (some minutes)"
+  env -u CARGO_TARGET_DIR -u RUSTFLAGS cargo install --quiet --locked "$1@$2" >&2 || fail "cargo could not install $1 $2"
+}
+
+cargo_tools() {
+  rust
+  cargo fmt --version >/dev/null 2>&1 || fail "cargo fmt is missing: rustup component add rustfmt"
+  cargo clippy --version >/dev/null 2>&1 || fail "cargo clippy is missing: rustup component add clippy"
+  PATH="$PATH:${CARGO_INSTALL_ROOT:-${CARGO_HOME:-$HOME/.cargo}}/bin"
+  install_cargo_tool cargo-nextest "$NEXTEST_VERSION"
+  install_cargo_tool cargo-deny "$DENY_VERSION"
+}
+
+[ $# -gt 0 ] || set -- all
+for need in "$@"; do
+  case "$need" in
+    compiler) compiler ;;
+    python) python ;;
+    tools) tools ;;
+    cargo-tools) cargo_tools ;;
+    all) compiler; python; tools; cargo_tools ;;
+    *) fail "unknown need '$need': compiler, python, tools, cargo-tools or all" ;;
+  esac
+done
