@@ -1,1 +1,54 @@
-//! api
+//! What the server and its clients say to each other: the types of API v1, and its problems.
+//!
+//! | module | what |
+//! | --- | --- |
+//! | [`Time`] | RFC 3339 in UTC with milliseconds, the only form of a time on the wire |
+//! | [`Version`], [`Health`] | the handshake: who is there, what it can, whether it is well |
+//! | [`StationView`] | how the station is right now |
+//! | [`FrameView`], [`TelemetryPage`], [`EventView`] | what was heard, the values in it, what happened |
+//! | [`CommandRequest`], [`CommandView`] | telecommands: asked for, and on their way |
+//! | [`telecommand`] | every telecommand of the ICD to JSON and back, with errors that name the field |
+//! | [`ImageView`], [`ChunkMap`], [`DownloadView`] | pictures and the orders to bring them home |
+//! | [`StreamMessage`] | what the WebSocket says |
+//! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
+//!
+//! Rules of the wire: unknown is `null`, never 0; units stand in the names; requests refuse fields they do not know,
+//! answers may grow fields, so a client ignores those it does not know.
+//!
+//! What this crate does **not** do: it has no HTTP, no clock and no SQL, and it knows `protocol` only. The server
+//! converts its own types into these.
+
+mod command;
+mod download;
+mod event;
+mod frame;
+mod image;
+mod page;
+mod problem;
+mod station;
+mod stream;
+pub mod telecommand;
+mod telemetry;
+mod time;
+mod version;
+
+pub use command::{CommandRequest, CommandView, GateWord, Outcome, OutcomeWord, StageView};
+pub use download::{DownloadRequest, DownloadView};
+pub use event::{EventView, LimitView};
+pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
+pub use image::{ChunkMap, ImageView};
+pub use page::{Nothing, Page};
+pub use problem::{FieldError, Problem, ProblemKind};
+pub use station::{DemoView, ImageProgress, LinkView, SatelliteView, SealingView, StationView, StorageView};
+pub use stream::StreamMessage;
+pub use telecommand::ArgumentError;
+pub use telemetry::{Bucket, LatestValue, ParameterView, Sample, TelemetryPage};
+pub use time::{Time, TimeError};
+pub use version::{Health, Version};
+
+/// The version of this API; the first part of every path.
+pub const API_VERSION: u32 = 1;
+
+/// What this version can do; a client asks for a capability by name, never by version number.
+pub const CAPABILITIES: [&str; 7] =
+    ["archive", "commands", "downloads", "images", "idempotency", "limits", "stream-resume"];

@@ -1,0 +1,138 @@
+//! How the station is right now.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Time;
+
+/// The station now. A view, not a record: it is not kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StationView {
+    /// Station.
+    pub station: String,
+    /// The station's time, when this was asked.
+    pub at: Time,
+    /// Time, satellite or radio are made up.
+    pub simulated: bool,
+    /// The newest event in the archive; 0 when there is none.
+    pub last_sequence: i64,
+    /// Each satellite.
+    pub satellites: Vec<SatelliteView>,
+    /// Each link.
+    pub links: Vec<LinkView>,
+    /// Sealing with each key.
+    pub sealing: Vec<SealingView>,
+    /// Storage.
+    pub storage: StorageView,
+    /// What a demo wants to tell of itself.
+    pub demo: Option<DemoView>,
+}
+
+/// One satellite now.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SatelliteView {
+    /// Satellite.
+    pub satellite: String,
+    /// Id of the key that seals for it; `null` when it can only be heard.
+    pub key: Option<String>,
+    /// When it was last heard.
+    pub heard_at: Option<Time>,
+    /// When its last heartbeat was heard.
+    pub heartbeat_at: Option<Time>,
+    /// When its next heartbeat is due, if that can be told.
+    pub next_heartbeat_at: Option<Time>,
+    /// Heard within two and a half heartbeat periods.
+    pub in_contact: bool,
+    /// In view, when that is known.
+    pub in_view: Option<bool>,
+    /// Loss of signal, when known.
+    pub los_at: Option<Time>,
+    /// What the uplink is doing, as a short sentence.
+    pub uplink: String,
+    /// The command on its way.
+    pub outstanding: Option<u64>,
+    /// Commands that wait.
+    pub queued: u64,
+    /// The newest image.
+    pub image: Option<ImageProgress>,
+    /// The active download.
+    pub download: Option<u64>,
+}
+
+/// How far an image is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ImageProgress {
+    /// Image.
+    pub image: u64,
+    /// Chunks held.
+    pub held: u32,
+    /// Chunks in all.
+    pub chunks: u32,
+    /// Chunks with versions that differ.
+    pub conflicts: u32,
+}
+
+/// One link now.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LinkView {
+    /// Link.
+    pub link: String,
+    /// Satellite that it hears.
+    pub satellite: String,
+    /// `ok`, `unavailable`, `disabled` or `failed`.
+    pub state: String,
+    /// Why it is not ok.
+    pub reason: Option<String>,
+    /// It may transmit.
+    pub armed: bool,
+    /// It is transmitting.
+    pub on_air: bool,
+    /// Whole frames heard since the start.
+    pub frames: u64,
+    /// Bytes that belonged to no frame since the start.
+    pub skipped_bytes: u64,
+    /// Candidates for a frame that failed since the start.
+    pub bad: u64,
+    /// Uplink frames radiated since the start.
+    pub radiated: u64,
+    /// Their time on the air in milliseconds.
+    pub airtime_ms: u64,
+    /// Level of the newest frame in dBm.
+    pub rssi_dbm: Option<i16>,
+}
+
+/// Sealing with one key.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SealingView {
+    /// Key id.
+    pub key: String,
+    /// Satellite.
+    pub satellite: String,
+    /// Why nothing is sealed, with the remedy; `null` when all is well.
+    pub locked: Option<String>,
+}
+
+/// Storage now.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StorageView {
+    /// Why nothing is stored; `null` when all is well.
+    pub failing: Option<String>,
+    /// Records that wait to be stored.
+    pub waiting: u64,
+    /// Raw frames in the reserve since storage failed.
+    pub reserved: u64,
+    /// Derived records dropped since the start; `gs-server redecode` makes them again.
+    pub derived_dropped: u64,
+    /// Raw frames that found no place since the start.
+    pub frames_lost: u64,
+}
+
+/// What a demo tells of itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DemoView {
+    /// How many simulated seconds pass in one, at most.
+    pub speed: f64,
+    /// Seed of its randomness.
+    pub seed: u64,
+    /// Probability that a packet is lost.
+    pub loss: f64,
+}
