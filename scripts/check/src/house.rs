@@ -75,7 +75,8 @@ pub(crate) const ROOMS: &[Room] = &[
 ///
 /// Without tokio and sqlx in reach, nobody can quietly make the engine or a rehearsal wait for a socket or a disk.
 pub(crate) const WALLED_OUTSIDERS: &[(&str, &[&str])] = &[
-    ("tokio", &["gs-server", "api", "ground-app", "end-to-end"]),
+    // migrations: its tests run a database.
+    ("tokio", &["migrations", "gs-server", "api", "ground-app", "end-to-end"]),
     ("axum", &["gs-server", "end-to-end"]),
     ("sqlx", &["migrations", "gs-server"]),
     ("serialport", &["gs-server", "end-to-end"]),
