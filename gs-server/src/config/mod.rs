@@ -1,0 +1,138 @@
+//! The configuration: one TOML file, one struct per section.
+//!
+//! Unknown keys are refused; every error names the key, what was found and what to do. Paths are relative to the
+//! folder of the file. `docs/configuration.md` is the operator's page on it.
+//!
+//! ```
+//! let text = r#"
+//!     [station]
+//!     name = "uni-roof"
+//!     [[satellites]]
+//!     name = "pixelsat-1"
+//!     [[links]]
+//!     name = "e22"
+//!     satellite = "pixelsat-1"
+//!     kind = "serial"
+//!     port = "/dev/ttyUSB0"
+//!     [storage]
+//!     folder = "data"
+//! "#;
+//! let config = gs_server::config::Config::from_toml(text, std::path::Path::new("/srv/ground"))?;
+//! config.check()?;
+//! assert_eq!(config.storage.folder, std::path::Path::new("/srv/ground/data"));
+//! # Ok::<(), gs_server::config::ConfigError>(())
+//! ```
+
+mod check;
+mod environment;
+mod error;
+mod links;
+mod reload;
+mod satellites;
+mod server;
+mod station;
+mod summary;
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+pub use environment::Environment;
+pub use error::ConfigError;
+pub use links::{AuxInput, LinkKind, LinkSection, ModePinWiring, Phy, UsbId};
+pub use reload::Changes;
+pub use satellites::{CounterSetting, LimitSection, SatelliteSection, Thresholds};
+pub use server::{ClockSetting, HttpSection, LogSection, SimulationSection, StationSection, StorageSection};
+pub use station::{driver_config, station_config};
+
+/// Everything that `serve` must know.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Who we are.
+    pub station: StationSection,
+    /// Whom we hear and command.
+    #[serde(default)]
+    pub satellites: Vec<SatelliteSection>,
+    /// The ways to our radios.
+    #[serde(default)]
+    pub links: Vec<LinkSection>,
+    /// Where everything is kept.
+    pub storage: StorageSection,
+    /// Who may talk to the server, and where.
+    #[serde(default)]
+    pub http: HttpSection,
+    /// What is logged.
+    #[serde(default)]
+    pub log: LogSection,
+    /// How simulated time runs; only with simulated links.
+    #[serde(default)]
+    pub simulation: Option<SimulationSection>,
+}
+
+impl Config {
+    /// Reads a file. Paths in it are taken relative to its folder; the environment is applied.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when it cannot be read or is not a configuration; see also [`Config::check`].
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        let base = path.parent().unwrap_or_else(|| Path::new(""));
+        let mut config = Self::from_toml(&text, base).map_err(|error| error.in_file(path))?;
+        config.apply(&Environment::read());
+        Ok(config)
+    }
+
+    /// Reads TOML text; relative paths are taken relative to `base`. No check of what the values mean.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`] with line and column.
+    pub fn from_toml(text: &str, base: &Path) -> Result<Self, ConfigError> {
+        let mut config: Self = toml::from_str(text).map_err(|error| ConfigError::syntax(&error))?;
+        config.anchor_paths(base);
+        Ok(config)
+    }
+
+    /// Puts what the environment says over what the file says.
+    pub fn apply(&mut self, environment: &Environment) {
+        if let Some(listen) = environment.listen {
+            self.http.listen = listen;
+        }
+        if let Some(folder) = &environment.data {
+            self.storage.folder.clone_from(folder);
+        }
+        if let Some(level) = &environment.log {
+            self.log.filter.clone_from(level);
+        }
+    }
+
+    fn anchor_paths(&mut self, base: &Path) {
+        let anchor = |path: &mut PathBuf| {
+            if path.is_relative() {
+                *path = base.join(&*path);
+            }
+        };
+        anchor(&mut self.storage.folder);
+        self.http.token_file.as_mut().map_or((), anchor);
+        for satellite in &mut self.satellites {
+            satellite.key_file.as_mut().map_or((), anchor);
+        }
+        for link in &mut self.links {
+            link.file.as_mut().map_or((), anchor);
+        }
+    }
+
+    /// Everything is simulated: the links say so ([`Config::check`] makes sure that they agree).
+    pub fn is_simulated(&self) -> bool {
+        self.links.iter().any(|link| link.simulated)
+    }
+
+    /// The file with the token that every write needs: as configured, or `token` in the data folder.
+    pub fn token_file(&self) -> PathBuf {
+        self.http.token_file.clone().unwrap_or_else(|| self.storage.folder.join("token"))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,99 @@
+//! Sections about the server itself: station, storage, http, log, simulation.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+/// `[station]`: who we are.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StationSection {
+    /// Name of the station: 1 to 32 of a-z, 0-9, `-`, `_`.
+    pub name: String,
+    /// Who says that this machine's clock is right. Default `kernel`.
+    #[serde(default)]
+    pub clock: ClockSetting,
+}
+
+/// Who says that the clock is right before anything is sealed without a stored counter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClockSetting {
+    /// The kernel's synchronisation state, as systemd-timesyncd, timedated or chrony tell it.
+    #[default]
+    Kernel,
+    /// An operator, after each start (`POST /clock/vouch`); the kernel is not asked.
+    Operator,
+    /// Whoever wrote the configuration: for machines whose clock is disciplined in a way that cannot be asked.
+    Trust,
+}
+
+/// `[storage]`: where everything is kept.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StorageSection {
+    /// The data folder; made with mode 0700 when it is not there.
+    pub folder: PathBuf,
+    /// Bytes set aside for raw frames while the database takes nothing. Default 4 MiB (about 14,000 frames).
+    #[serde(default = "default_reserve")]
+    pub reserve_bytes: u64,
+    /// Pages of 4096 bytes that the database may grow to; no limit without it.
+    #[serde(default)]
+    pub max_page_count: Option<u32>,
+}
+
+const fn default_reserve() -> u64 {
+    4 << 20
+}
+
+/// `[http]`: who may talk to the server, and where.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HttpSection {
+    /// Address and port. Default `127.0.0.1:8700`; port 0 takes any.
+    pub listen: SocketAddr,
+    /// Names under which browsers and programs may address the server, besides loopback (`Host` header).
+    pub allowed_hosts: Vec<String>,
+    /// The 0600 file with the token that every write needs. Default `token` in the data folder.
+    pub token_file: Option<PathBuf>,
+}
+
+impl Default for HttpSection {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8700)),
+            allowed_hosts: Vec::new(),
+            token_file: None,
+        }
+    }
+}
+
+/// `[log]`: what is logged.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogSection {
+    /// A filter of `tracing`, e.g. `info` or `info,gs_server::links=debug`. Default `info`.
+    pub filter: String,
+    /// One JSON object a line instead of text. Default false.
+    pub json: bool,
+}
+
+impl Default for LogSection {
+    fn default() -> Self {
+        Self { filter: "info".into(), json: false }
+    }
+}
+
+/// `[simulation]`: how simulated time runs.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationSection {
+    /// Simulated seconds per second: the same figure as the twin's. Default 1.
+    #[serde(default = "default_speed")]
+    pub speed: f64,
+}
+
+const fn default_speed() -> f64 {
+    1.0
+}
