@@ -4,6 +4,8 @@
 //! |---|---|
 //! | [`airtime`] | how long a packet occupies the air, and a byte the UART |
 //! | [`registers`] | the module's configuration block, bit by bit |
+//! | [`command`] | what the host writes in configuration mode |
+//! | [`reply`] | what the module answers: scanners that survive junk, echoes and missing line ends |
 //! | [`driver`] | the state machine that brings a module up, sends one frame at a time and delivers what is heard |
 //! | [`model`] | the module itself in virtual time, with its faults, to test the driver and to stand behind a twin |
 //!
@@ -22,6 +24,8 @@
 //! ```
 
 pub mod airtime;
+pub mod command;
 pub mod driver;
 pub mod model;
 pub mod registers;
+pub mod reply;

@@ -1,0 +1,7 @@
+//! Driver and model joined in virtual time.
+
+mod bench;
+mod bounds;
+mod faults;
+mod module;
+mod wirings;
