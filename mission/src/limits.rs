@@ -28,8 +28,10 @@ impl LimitRule {
             return None;
         }
         let slack = |level: Level| if level <= held { self.deadband } else { 0.0 };
-        let low = self.below.iter().filter(|(level, limit)| value < limit + slack(*level)).map(|(l, _)| *l).max();
-        let high = self.above.iter().filter(|(level, limit)| value > limit - slack(*level)).map(|(l, _)| *l).max();
+        let low =
+            self.below.iter().filter(|(level, limit)| value < limit + slack(*level)).map(|(l, _)| *l).max();
+        let high =
+            self.above.iter().filter(|(level, limit)| value > limit - slack(*level)).map(|(l, _)| *l).max();
         Some(low.max(high).unwrap_or_default())
     }
 }

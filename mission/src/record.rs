@@ -6,7 +6,9 @@
 use protocol::{Counter, FrameForm, KeyId, Nonce, RequestTag};
 
 use crate::clock::UtcUs;
-use crate::id::{BatchId, CommandId, DownloadId, FrameId, ImageId, LinkId, Principal, SatelliteId, StationId};
+use crate::id::{
+    BatchId, CommandId, DownloadId, FrameId, ImageId, LinkId, Principal, SatelliteId, StationId,
+};
 use crate::intent::IntentReceipt;
 use crate::level::Level;
 use crate::stage::Stage;
@@ -37,7 +39,8 @@ pub struct Route {
 /// One row to be.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
-    /// A raw frame, for ever.
+    /// A raw frame, for ever. The same id again changes `nested` alone: what lay inside a candidate that turned out
+    /// to be no frame counts after all.
     Frame(FrameRecord),
     /// Somebody heard a frame.
     Reception(ReceptionRecord),

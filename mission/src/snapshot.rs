@@ -112,4 +112,3 @@ pub enum Witness {
     /// It stands here.
     At(Counter),
 }
-

@@ -69,7 +69,11 @@ impl Stage {
     /// `idempotent` commands may return to the queue after an attempt whose outcome is not known; the others never.
     pub const fn may_be_followed_by(self, next: Self, idempotent: bool) -> bool {
         match self {
-            Self::Queued => matches!(next, Self::Sealed | Self::Expired | Self::Cancelled | Self::Failed),
+            // An idempotent command that waits to be repeated may still be answered for its earlier attempt.
+            Self::Queued => {
+                matches!(next, Self::Sealed | Self::Expired | Self::Cancelled | Self::Failed)
+                    || (idempotent && matches!(next, Self::Answered | Self::Rejected))
+            }
             Self::Sealed => matches!(
                 next,
                 Self::Radiating | Self::Expired | Self::Cancelled | Self::Failed | Self::Queued
@@ -77,7 +81,12 @@ impl Stage {
             // Back to the queue only when the radio is certain that nothing left the antenna.
             Self::Radiating => matches!(
                 next,
-                Self::Radiated | Self::Unknown | Self::Failed | Self::Queued | Self::Answered | Self::Rejected
+                Self::Radiated
+                    | Self::Unknown
+                    | Self::Failed
+                    | Self::Queued
+                    | Self::Answered
+                    | Self::Rejected
             ),
             Self::Radiated => {
                 matches!(next, Self::Answered | Self::Rejected | Self::Unknown | Self::Failed)

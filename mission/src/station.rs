@@ -1,10 +1,52 @@
-//! The station engine.
+//! The station engine: inputs in, effects out. Its parts:
+//!
+//! | part | idea |
+//! | --- | --- |
+//! | `journal` | what is to be made durable, in order, and what waits for it |
+//! | `sealing` | which counter a frame may be sealed with |
+//! | `contact` | when the satellite was heard, and when it transmits by itself |
+//! | `link`, `satellite` | what is known of each |
+//! | `intake` | bytes to frames, frames to records |
+//! | `packets` | what a packet changes |
+//! | `gate` | whether the uplink may be used now, and if not, when |
+//! | `uplink` | one exchange at a time: seal, witness, mark, transmit, await |
+//! | `outcome` | stages: how commands end |
+//! | `download` | what to ask for next |
+//! | `intents` | what operators want |
+//! | `restore` | how a new life begins |
 
-use crate::clock::{MonoUs, Now};
+mod contact;
+mod download;
+mod gate;
+mod image;
+mod intake;
+mod intents;
+mod journal;
+mod link;
+mod outcome;
+mod packets;
+mod restore;
+mod satellite;
+mod sealing;
+mod uplink;
+mod view;
+
+use std::collections::VecDeque;
+
+use protocol::KeyId;
+
+use crate::clock::{MonoUs, Now, UtcUs};
 use crate::config::StationConfig;
-use crate::port::{Effect, Input};
-use crate::snapshot::Snapshot;
+use crate::id::{FrameId, LinkId, Principal, SatelliteId, StationId};
+use crate::level::Level;
+use crate::port::{Effect, Input, LinkState};
+use crate::record::{AuditRecord, EventKind, EventRecord, Record, Route, Subject};
+use crate::snapshot::{LastIds, Snapshot};
 use crate::status::Status;
+
+use journal::Journal;
+use link::Link;
+use satellite::Satellite;
 
 /// Where the engine's random bytes come from: the operating system, or a seed.
 pub trait Entropy: Send {
@@ -12,39 +54,189 @@ pub trait Entropy: Send {
     fn fill(&mut self, bytes: &mut [u8]);
 }
 
+/// A frame that was heard a moment ago, so that the same bytes again are a second reception and not a second frame.
+struct Recent {
+    id: FrameId,
+    at: UtcUs,
+    bytes: Box<[u8]>,
+}
+
 /// The station: a plain state machine.
 pub struct Station {
-    #[expect(dead_code, reason = "signatures first")]
-    config: StationConfig,
+    station: StationId,
+    me: Principal,
+    entropy: Box<dyn Entropy>,
+    journal: Journal,
+    effects: VecDeque<Effect>,
+    satellites: Vec<Satellite>,
+    links: Vec<Link>,
+    ids: LastIds,
+    last_tx: u64,
+    recent: VecDeque<Recent>,
+    synchronised: bool,
+    vouched: bool,
+    stopping: bool,
+    wake: Option<MonoUs>,
 }
 
 impl Station {
     /// A station that goes on from what was stored.
-    pub fn new(config: StationConfig, _snapshot: Snapshot, _entropy: Box<dyn Entropy>, _now: Now) -> Self {
-        Self { config }
+    pub fn new(config: StationConfig, snapshot: Snapshot, entropy: Box<dyn Entropy>, now: Now) -> Self {
+        restore::station(config, snapshot, entropy, now)
     }
 
     /// Takes an input. Effects that follow from it wait in [`Station::next_effect`].
-    pub fn handle(&mut self, _now: Now, _input: Input<'_>) {}
+    pub fn handle(&mut self, now: Now, input: Input<'_>) {
+        match input {
+            Input::Bytes { link, bytes, source, received } => self.take_bytes(link, bytes, source, received),
+            Input::Recovered(frame) => self.take_recovered(frame),
+            Input::Link { link, state } => self.link_state(now, link, state),
+            Input::TxStarted(tx) => self.tx_started(tx),
+            Input::TxDone { tx, airtime_us, .. } => self.tx_done(now, tx, airtime_us),
+            Input::TxFailed { tx, radiated, reason } => self.tx_failed(now, tx, radiated, reason),
+            Input::PersistDone(batch) => {
+                if let Some(why) = self.journal.done(batch) {
+                    let message = format!("storage takes records again (it had failed: {why})");
+                    self.event(now.utc, EventKind::Storage, Level::Normal, About::default(), message);
+                }
+            }
+            Input::PersistFailed { batch, reason } => {
+                if self.journal.failed(now.mono, batch, reason) {
+                    let message = format!(
+                        "storage fails: {reason}. Nothing is transmitted; raw frames go to the reserve until it recovers"
+                    );
+                    self.event(now.utc, EventKind::Storage, Level::Critical, About::default(), message);
+                }
+            }
+            Input::WitnessDone { key, counter } => self.witness_done(now, key, counter),
+            Input::WitnessFailed { key, reason } => self.witness_failed(now, key, reason),
+            Input::Clock { synchronised } => self.synchronised = synchronised,
+            Input::View { satellite, in_view } => {
+                if let Some(satellite) = self.satellites.iter_mut().find(|s| s.id == *satellite) {
+                    satellite.contact.set_view(in_view);
+                }
+            }
+            Input::Intent(envelope) => self.intent(now, envelope),
+            Input::Wake => {}
+            Input::Stop => self.stopping = true,
+        }
+        self.go_on(now);
+    }
 
     /// The next effect, in the order in which they must be carried out.
     pub fn next_effect(&mut self) -> Option<Effect> {
-        None
+        self.effects.pop_front()
     }
 
     /// When [`Input::Wake`] is wanted at the latest.
     pub fn next_wakeup(&self) -> Option<MonoUs> {
-        None
+        self.wake
     }
 
     /// Everything that was taken in is durable: what [`Station::status`] tells may be shown.
     pub fn is_settled(&self) -> bool {
-        true
+        self.journal.is_settled()
     }
 
     /// How the station is now.
-    #[expect(clippy::unimplemented, reason = "signatures first")]
-    pub fn status(&self, _now: Now) -> Status {
-        unimplemented!()
+    pub fn status(&self, now: Now) -> Status {
+        self.view(now)
     }
+
+    /// Does what has become possible, lets effects out, and notes when to look again.
+    fn go_on(&mut self, now: Now) {
+        self.end_silence(now);
+        for s in 0..self.satellites.len() {
+            self.satellites[s].wake = None;
+            self.unlock_step(s);
+            self.note_contact(now, s);
+            self.expire(now, s);
+            self.settle_overdue(now, s);
+            self.uplink_step(now, s);
+        }
+        self.journal.flush(now.mono, &mut self.effects);
+        if self.journal.take_reserve_clear() {
+            self.effects.push_back(Effect::ReserveClear);
+        }
+        let wakes = self.satellites.iter().filter_map(|s| s.wake);
+        let receiving = self.links.iter().filter(|l| l.decoder.in_frame()).map(|l| l.receiving_until());
+        // Never "at once" again and again: what is due now was done now.
+        let soonest = now.mono.plus(1_000);
+        self.wake = wakes.chain(receiving).chain(self.journal.retry_at()).min().map(|at| at.max(soonest));
+    }
+
+    /// Somebody vouches for the clock.
+    fn is_vouched(&self) -> bool {
+        self.synchronised || self.vouched
+    }
+
+    fn link_index(&self, link: &LinkId) -> Option<usize> {
+        self.links.iter().position(|l| l.config.id == *link)
+    }
+
+    fn satellite_index(&self, satellite: &SatelliteId) -> Option<usize> {
+        self.satellites.iter().position(|s| s.id == *satellite)
+    }
+
+    /// Where things on this link go to and come from.
+    fn route(&self, link: usize) -> Route {
+        let link = &self.links[link];
+        Route {
+            satellite: self.satellites[link.satellite].id.clone(),
+            station: self.station.clone(),
+            link: link.config.id.clone(),
+        }
+    }
+
+    fn link_state(&mut self, now: Now, id: &LinkId, state: LinkState) {
+        let Some(l) = self.link_index(id) else { return };
+        let link = &mut self.links[l];
+        if link.state == state {
+            return;
+        }
+        link.up_since = (state == LinkState::Ok).then_some(now.mono);
+        let (level, message) = match &state {
+            LinkState::Ok => (Level::Normal, format!("link {id} is up")),
+            LinkState::Disabled => (Level::Normal, format!("link {id} is switched off")),
+            LinkState::Unavailable { reason } => {
+                (Level::Warning, format!("link {id} is not there: {reason}"))
+            }
+            LinkState::Failed { reason } => (Level::Distress, format!("link {id} does not work: {reason}")),
+        };
+        link.state = state;
+        let about = About { route: Some(self.route(l)), ..About::default() };
+        self.event(now.utc, EventKind::Link, level, about, message);
+    }
+
+    fn event(&mut self, at: UtcUs, kind: EventKind, level: Level, about: About, message: String) {
+        let (satellite, link) = match about.route {
+            Some(route) => (Some(route.satellite), Some(route.link)),
+            None => (None, None),
+        };
+        let station = self.station.clone();
+        let (key, subject) = (about.key, about.subject);
+        self.journal.push(Record::Event(EventRecord {
+            at,
+            kind,
+            level,
+            satellite,
+            station,
+            link,
+            key,
+            subject,
+            message,
+        }));
+    }
+
+    fn audit(&mut self, at: UtcUs, who: &Principal, action: &'static str, detail: String) {
+        self.journal.push(Record::Audit(AuditRecord { at, who: who.clone(), action, detail }));
+    }
+}
+
+/// What an event is about.
+#[derive(Debug, Clone, Default)]
+struct About {
+    route: Option<Route>,
+    key: Option<KeyId>,
+    subject: Subject,
 }

@@ -16,7 +16,10 @@ pub fn points(packet: &Downlink) -> Vec<Point> {
     packet.visit_fields(&mut |field| {
         let value = match field.value {
             FieldValue::F32(v) => Some(f64::from(v)).filter(|v| v.is_finite()),
-            #[expect(clippy::cast_precision_loss, reason = "counters and times stay far below 2^53 for 285 years")]
+            #[expect(
+                clippy::cast_precision_loss,
+                reason = "counters and times stay far below 2^53 for 285 years"
+            )]
             FieldValue::U(v) => Some(v as f64),
             FieldValue::Bool(v) => Some(f64::from(u8::from(v))),
             FieldValue::Bytes(_) => return,

@@ -1,0 +1,128 @@
+//! Whether the uplink may be used now; and if not, why, and when to look again.
+//!
+//! Listen first: a transmission starts only when the satellite is silent by its schedule, nothing is being received,
+//! and nothing of ours is on the air.
+
+use std::borrow::Cow;
+
+use super::contact::Slot;
+use super::outcome::mono_of;
+use super::satellite::Satellite;
+use super::{Link, Station};
+use crate::clock::{MonoUs, Now};
+use crate::port::LinkState;
+use crate::record::Gate;
+
+/// Without contact, listen for this long before a blind transmission.
+const LISTEN_FIRST_US: u64 = 5_000_000;
+
+/// Not now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Wait {
+    pub(super) why: Cow<'static, str>,
+    /// `None`: something must happen first.
+    pub(super) until: Option<MonoUs>,
+}
+
+fn wait(why: &'static str, until: Option<MonoUs>) -> Wait {
+    Wait { why: Cow::Borrowed(why), until }
+}
+
+/// What a transmission and its answer need.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Need {
+    pub(super) gate: Gate,
+    /// From the end of our transmission to the expected end of the answer, in microseconds.
+    pub(super) answer_us: u64,
+}
+
+impl Station {
+    /// May a frame be radiated over this link now?
+    pub(super) fn gate(&self, now: Now, s: usize, l: usize, need: Need) -> Result<(), Wait> {
+        let (sat, link) = (&self.satellites[s], &self.links[l]);
+        if self.stopping {
+            return Err(wait("the station is stopping", None));
+        }
+        if let Some(why) = self.journal.failing() {
+            return Err(Wait { why: format!("storage fails: {why}").into(), until: None });
+        }
+        self.seal_gate(sat, now)?;
+        link_gate(link, now, need.gate)?;
+        contact_gate(sat, now, need.gate)?;
+        silence_gate(sat, link, now)?;
+        los_gate(sat, link, now, need.answer_us)
+    }
+
+    fn seal_gate(&self, sat: &Satellite, _now: Now) -> Result<(), Wait> {
+        match &sat.sealer {
+            None => Err(wait("this satellite has no key", None)),
+            Some(sealer) => match sealer.lock(self.is_vouched()) {
+                Some(lock) => Err(Wait { why: lock.to_string().into(), until: None }),
+                None => Ok(()),
+            },
+        }
+    }
+}
+
+fn link_gate(link: &Link, now: Now, gate: Gate) -> Result<(), Wait> {
+    if link.config.receive_only {
+        return Err(wait("this link only receives", None));
+    }
+    if !link.armed {
+        return Err(wait("the transmitter is not armed", None));
+    }
+    if link.state != LinkState::Ok {
+        return Err(Wait { why: format!("the link is {}", link.state.name()).into(), until: None });
+    }
+    if link.on_air.is_some() {
+        return Err(wait("something of ours is on the air", None));
+    }
+    let listened = link.up_since.map_or(0, |since| now.mono.since(since));
+    if gate == Gate::Blind && listened < LISTEN_FIRST_US {
+        return Err(wait("listening first", Some(now.mono.plus(LISTEN_FIRST_US - listened))));
+    }
+    Ok(())
+}
+
+fn contact_gate(sat: &Satellite, now: Now, gate: Gate) -> Result<(), Wait> {
+    if gate == Gate::Blind || sat.contact.is_open(now.mono) {
+        return Ok(());
+    }
+    Err(match sat.contact.in_view() {
+        Some(false) => wait("the satellite is below the horizon", None),
+        _ => wait("listening: the satellite was not heard lately", None),
+    })
+}
+
+fn silence_gate(sat: &Satellite, link: &Link, now: Now) -> Result<(), Wait> {
+    if link.is_receiving(now.mono) {
+        return Err(wait("a frame is being received", Some(link.receiving_until())));
+    }
+    if now.mono < sat.contact.quiet_until {
+        return Err(wait("the satellite is answering somebody", Some(sat.contact.quiet_until)));
+    }
+    let timing = link.config.timing;
+    let on_air = Slot { start: now.mono, end: now.mono.plus(timing.uplink_us() + timing.uplink_us() / 10) };
+    if let Some(slot) = sat.contact.next_slot(now.mono)
+        && slot.overlaps(on_air.start, on_air.end)
+    {
+        return Err(wait("a heartbeat is due", Some(slot.end)));
+    }
+    let busy = sat.settling.iter().filter_map(|w| w.busy_until);
+    if let Some((_, end)) =
+        busy.filter(|&(start, end)| on_air.overlaps(start, end)).max_by_key(|(_, end)| *end)
+    {
+        return Err(wait("a late answer is due", Some(end)));
+    }
+    Ok(())
+}
+
+fn los_gate(sat: &Satellite, link: &Link, now: Now, answer_us: u64) -> Result<(), Wait> {
+    let Some(los) = sat.contact.los() else { return Ok(()) };
+    let end = now.mono.plus(link.config.timing.uplink_us() + answer_us);
+    if end <= mono_of(now, los) {
+        Ok(())
+    } else {
+        Err(wait("the answer would not end before loss of signal", None))
+    }
+}

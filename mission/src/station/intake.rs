@@ -1,0 +1,250 @@
+//! Bytes to frames, frames to records: raw first, then what follows from it.
+
+use protocol::{DownFrame, DownItem, RequestTag};
+
+use super::link::LastFrame;
+use super::{About, Recent, Station};
+use crate::clock::{Now, UtcUs};
+use crate::id::{FrameId, LinkId};
+use crate::level::Level;
+use crate::port::ReservedFrame;
+use crate::record::{
+    DECODER_VERSION, EventKind, FrameRecord, ReceptionRecord, ReceptionRssi, Record, Route, Source, Subject,
+    TelemetryRecord,
+};
+use crate::telemetry;
+
+/// The same bytes within this time are one frame.
+const SAME_FRAME_US: i64 = 30_000_000;
+/// So many frames are remembered for that.
+const RECENT_FRAMES: usize = 256;
+
+/// A frame that has just been taken in.
+#[derive(Debug, Clone)]
+pub(super) struct Heard {
+    pub(super) id: FrameId,
+    pub(super) route: Route,
+    pub(super) link: usize,
+    pub(super) at: Now,
+    pub(super) tag: Option<RequestTag>,
+    /// From our own radio, now: it tells about the present. Otherwise it only fills the archive.
+    pub(super) live: bool,
+    /// Bytes of the frame, for how long it was on the air.
+    pub(super) length: usize,
+    /// These bytes were heard a moment ago already.
+    pub(super) repeat: bool,
+}
+
+/// How a frame came in.
+struct How {
+    nested: bool,
+    promoted: bool,
+    source: Source,
+    rssi_dbm: Option<i16>,
+}
+
+/// An item of the decoder with its bytes, so that the decoder is free again.
+enum Item {
+    Frame { offset: u64, bytes: Box<[u8]>, nested: bool, promoted: bool, rssi_dbm: Option<i16> },
+    Rssi { offset: u64, dbm: i16 },
+}
+
+/// Keeps an item; a level that follows its frame at once joins it.
+fn collect(items: &mut Vec<Item>, item: DownItem<'_>) {
+    let frame_item = |offset, frame: DownFrame<'_>, nested, promoted| Item::Frame {
+        offset,
+        bytes: frame.bytes().into(),
+        nested,
+        promoted,
+        rssi_dbm: None,
+    };
+    match item {
+        DownItem::Frame { offset, frame, nested } => items.push(frame_item(offset, frame, nested, false)),
+        DownItem::Promoted { offset, frame } => items.push(frame_item(offset, frame, false, true)),
+        DownItem::Rssi { frame_offset, dbm } => {
+            let of_frame = items.iter_mut().rev().find_map(|item| match item {
+                Item::Frame { offset, rssi_dbm, promoted: false, .. } if *offset == frame_offset => {
+                    Some(rssi_dbm)
+                }
+                _ => None,
+            });
+            match of_frame {
+                Some(level) => *level = Some(dbm),
+                None => items.push(Item::Rssi { offset: frame_offset, dbm }),
+            }
+        }
+    }
+}
+
+impl Station {
+    pub(super) fn take_bytes(&mut self, link: &LinkId, bytes: &[u8], source: Source, received: Now) {
+        let Some(l) = self.link_index(link) else { return };
+        let mut items = Vec::new();
+        self.links[l].last_bytes = received.mono;
+        self.links[l].decoder.push(bytes, &mut |item| collect(&mut items, item));
+        self.take_items(l, items, source, received);
+    }
+
+    /// A line that has gone quiet decides what was nested in a candidate that will not end any more.
+    pub(super) fn end_silence(&mut self, now: Now) {
+        for l in 0..self.links.len() {
+            let link = &mut self.links[l];
+            if link.decoder.in_frame() && now.mono >= link.receiving_until() {
+                let mut items = Vec::new();
+                link.decoder.silence(&mut |item| collect(&mut items, item));
+                let source = if link.config.receive_only { Source::File } else { Source::Radio };
+                self.take_items(l, items, source, now);
+            }
+        }
+    }
+
+    fn take_items(&mut self, l: usize, items: Vec<Item>, source: Source, received: Now) {
+        for item in items {
+            match item {
+                Item::Frame { offset, bytes, nested, promoted, rssi_dbm } => {
+                    let Ok(frame) = DownFrame::parse(&bytes) else { continue };
+                    let rssi_dbm = rssi_dbm.or_else(|| promoted.then_some(self.links[l].rssi_dbm).flatten());
+                    let heard = self.archive(l, &frame, How { nested, promoted, source, rssi_dbm }, received);
+                    let link = &mut self.links[l];
+                    link.rssi_dbm = rssi_dbm.or(link.rssi_dbm);
+                    link.last_frame = Some(LastFrame {
+                        offset,
+                        frame: heard.id,
+                        route: heard.route.clone(),
+                        received_at: heard.at.utc,
+                    });
+                    if !nested {
+                        self.interpret(&heard, &frame);
+                    }
+                }
+                Item::Rssi { offset, dbm } => self.late_rssi(l, offset, dbm),
+            }
+        }
+    }
+
+    fn late_rssi(&mut self, l: usize, offset: u64, dbm: i16) {
+        let link = &mut self.links[l];
+        link.rssi_dbm = Some(dbm);
+        let Some(last) = link.last_frame.take_if(|last| last.offset == offset) else { return };
+        self.journal.push(Record::ReceptionRssi(ReceptionRssi {
+            frame: last.frame,
+            route: last.route,
+            received_at: last.received_at,
+            rssi_dbm: dbm,
+        }));
+    }
+
+    /// A frame that the reserve kept while storage failed: it fills the archive, it tells nothing of the present.
+    pub(super) fn take_recovered(&mut self, kept: &ReservedFrame) {
+        self.journal.mark_reserve_dirty();
+        let (Some(l), Ok(frame)) = (self.link_index(&kept.route.link), DownFrame::parse(&kept.bytes)) else {
+            return;
+        };
+        let at = Now { mono: crate::clock::MonoUs(0), utc: kept.received_at };
+        let how = How { nested: false, promoted: false, source: kept.source, rssi_dbm: kept.rssi_dbm };
+        let heard = Heard { live: false, ..self.archive(l, &frame, how, at) };
+        self.interpret(&heard, &frame);
+    }
+
+    /// Raw frame and reception, before anything else. What was promoted is stored already, as nested.
+    fn archive(&mut self, l: usize, frame: &DownFrame<'_>, how: How, received: Now) -> Heard {
+        let How { nested, promoted, source, rssi_dbm } = how;
+        let route = self.route(l);
+        let known = self.known_frame(frame.bytes(), received.utc);
+        let id = known.unwrap_or_else(|| {
+            self.ids.frame += 1;
+            FrameId(self.ids.frame)
+        });
+        let heard = Heard {
+            id,
+            route: route.clone(),
+            link: l,
+            at: received,
+            tag: frame.tag(),
+            live: source == Source::Radio,
+            length: frame.bytes().len(),
+            repeat: known.is_some() && !promoted,
+        };
+        let record = FrameRecord {
+            id,
+            route: route.clone(),
+            bytes: frame.bytes().into(),
+            form: frame.form(),
+            packet_type: frame.header().map(|header| header.packet_type),
+            tag: frame.tag(),
+            nested,
+            heard_at: received.utc,
+        };
+        if promoted && known.is_some() {
+            self.journal.push(Record::Frame(record));
+            return heard;
+        }
+        let reception =
+            ReceptionRecord { frame: id, route: route.clone(), source, received_at: received.utc, rssi_dbm };
+        if known.is_some() {
+            self.journal.push(Record::Reception(reception));
+        } else {
+            self.recent.push_back(Recent { id, at: received.utc, bytes: frame.bytes().into() });
+            if self.recent.len() > RECENT_FRAMES {
+                self.recent.pop_front();
+            }
+            self.journal.push_frame(record, reception);
+        }
+        let message = format!(
+            "{}{} of {} bytes heard over {}",
+            frame.packet().map_or("frame", |packet| packet.name()),
+            if nested { " (inside another frame)" } else { "" },
+            frame.bytes().len(),
+            route.link
+        );
+        self.heard_event(&heard, EventKind::FrameHeard, Level::Normal, message);
+        heard
+    }
+
+    fn known_frame(&mut self, bytes: &[u8], at: UtcUs) -> Option<FrameId> {
+        while self.recent.front().is_some_and(|recent| at.0 - recent.at.0 > SAME_FRAME_US) {
+            self.recent.pop_front();
+        }
+        let same = |recent: &&Recent| *recent.bytes == *bytes && (at.0 - recent.at.0).abs() <= SAME_FRAME_US;
+        self.recent.iter().find(same).map(|recent| recent.id)
+    }
+
+    /// Values, then what the packet changes.
+    fn interpret(&mut self, heard: &Heard, frame: &DownFrame<'_>) {
+        if heard.live {
+            self.heard_live(heard, frame.packet_type());
+        }
+        let packet = match frame.packet() {
+            Ok(packet) => packet,
+            Err(error) => {
+                let message = match frame.packet_type() {
+                    protocol::down_type::HEARTBEAT => {
+                        format!("unknown heartbeat layout ({} bytes): kept raw", frame.payload().len())
+                    }
+                    _ => format!("a frame is kept raw, its packet cannot be read: {error}"),
+                };
+                self.heard_event(heard, EventKind::FrameHeard, Level::Watch, message);
+                return;
+            }
+        };
+        let points = telemetry::points(&packet);
+        if !points.is_empty() && !heard.repeat {
+            self.limits(heard, &points);
+            self.journal.push(Record::Telemetry(TelemetryRecord {
+                frame: heard.id,
+                route: heard.route.clone(),
+                at: heard.at.utc,
+                decoder_version: DECODER_VERSION,
+                points,
+            }));
+        }
+        self.packet(heard, &packet);
+    }
+
+    /// An event about a frame that was heard.
+    pub(super) fn heard_event(&mut self, heard: &Heard, kind: EventKind, level: Level, message: String) {
+        let subject = Subject { frame: Some(heard.id), ..Subject::default() };
+        let about = About { route: Some(heard.route.clone()), subject, ..About::default() };
+        self.event(heard.at.utc, kind, level, about, message);
+    }
+}

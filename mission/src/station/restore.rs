@@ -1,0 +1,200 @@
+//! How a new life begins: from what was stored, and honestly about what was not.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::contact::Contact;
+use super::image::Assembly;
+use super::journal::Journal;
+use super::link::Link;
+use super::outcome::mono_of;
+use super::satellite::{Command, Download, Exchange, Satellite, Settling};
+use super::sealing::Sealer;
+use super::{About, Entropy, Station};
+use crate::clock::{MonoUs, Now};
+use crate::config::{SatelliteConfig, StationConfig};
+use crate::id::{CommandId, Principal};
+use crate::level::Level;
+use crate::limits::LimitState;
+use crate::port::Effect;
+use crate::record::EventKind;
+use crate::snapshot::{CommandSnapshot, SatelliteSnapshot, Snapshot};
+use crate::stage::Stage;
+
+/// Bytes of a heartbeat frame, which sets how long its slot is.
+const HEARTBEAT_BYTES: usize = 133;
+
+/// The station as the last life left it.
+pub(super) fn station(
+    config: StationConfig,
+    snapshot: Snapshot,
+    entropy: Box<dyn Entropy>,
+    now: Now,
+) -> Station {
+    let satellites: Vec<Satellite> = config
+        .satellites
+        .iter()
+        .map(|sat| {
+            let left = snapshot.satellites.iter().find(|found| found.satellite == sat.id);
+            satellite(&config, sat, left, &snapshot, now)
+        })
+        .collect();
+    let links = config
+        .links
+        .iter()
+        .filter_map(|link| {
+            let s = satellites.iter().position(|sat| sat.id == link.satellite)?;
+            Some(Link::new(link.clone(), s, satellites[s].profile.rssi))
+        })
+        .collect();
+    let mut station = Station {
+        station: config.station,
+        me: Principal::engine(),
+        entropy,
+        journal: Journal::default(),
+        effects: VecDeque::new(),
+        satellites,
+        links,
+        ids: snapshot.last_ids,
+        last_tx: 0,
+        recent: VecDeque::new(),
+        synchronised: false,
+        vouched: false,
+        stopping: false,
+        wake: None,
+    };
+    station.begin_life(now);
+    station
+}
+
+fn satellite(
+    config: &StationConfig,
+    sat: &SatelliteConfig,
+    left: Option<&SatelliteSnapshot>,
+    snapshot: &Snapshot,
+    now: Now,
+) -> Satellite {
+    let timing =
+        config.links.iter().find(|link| link.satellite == sat.id).map(|l| l.timing).unwrap_or_default();
+    let frame_us = timing.frame_us(HEARTBEAT_BYTES);
+    let mut contact = Contact::new(sat.profile.heartbeat_period_us, frame_us);
+    if let Some((_, heard_at, _)) = left.and_then(|l| l.heartbeat) {
+        contact.restore(heard_at, now, timing.delivery_us(HEARTBEAT_BYTES) + frame_us);
+    }
+    let level_of = |parameter: &str| {
+        let found = left.and_then(|l| l.limits.iter().find(|limit| limit.parameter == parameter));
+        found.map_or(Level::Normal, |limit| limit.level)
+    };
+    let limits =
+        sat.limits.iter().map(|rule| LimitState::new(rule.clone(), level_of(&rule.parameter))).collect();
+    let commands: BTreeMap<CommandId, Command> =
+        left.into_iter().flat_map(|l| &l.commands).map(|c| (c.record.id, command(c))).collect();
+    let image = left.and_then(|l| l.image.as_ref()).map(Assembly::restore);
+    let capture_pending = commands.values().any(|c| {
+        matches!(c.record.telecommand, protocol::Telecommand::CaptureImage { .. })
+            && matches!(c.stage, Stage::Radiating | Stage::Radiated | Stage::Unknown)
+            && image.as_ref().is_none_or(|image| image.record.declared_at < c.stage_at)
+    });
+    let download = left.and_then(|l| l.downloads.last()).map(|record| Download {
+        ask_info: record.image.is_none() || record.image != image.as_ref().map(|image| image.record.id),
+        record: record.clone(),
+        not_before: MonoUs(0),
+        no_image: 0,
+    });
+    Satellite {
+        id: sat.id.clone(),
+        profile: sat.profile,
+        sealer: sat.key.clone().map(|key| {
+            let id = key.id();
+            Sealer::new(key, sat.profile.counter, snapshot.keys.iter().find(|found| found.key == id))
+        }),
+        witness_retry_at: None,
+        limits,
+        contact,
+        commands,
+        exchange: Exchange::Idle,
+        settling: Vec::new(),
+        image,
+        capture_pending,
+        download,
+        last_tag: left.and_then(|l| l.last_tag),
+        uptime: left.and_then(|l| l.heartbeat).map(|(_, at, uptime)| (at, uptime)),
+        note: "starting".to_owned(),
+        wake: None,
+    }
+}
+
+fn command(found: &CommandSnapshot) -> Command {
+    let was_on_air = matches!(found.stage, Stage::Radiating | Stage::Radiated | Stage::Unknown);
+    Command {
+        record: found.record.clone(),
+        stage: found.stage,
+        stage_at: found.stage_at,
+        attempt: found.attempt,
+        tag: found.sealed.as_ref().map(|sealed| sealed.tag),
+        on_air_at: was_on_air.then_some(found.stage_at),
+        sealed: found.sealed.clone().filter(|_| found.stage == Stage::Sealed),
+        not_before: MonoUs(0),
+    }
+}
+
+impl Station {
+    fn begin_life(&mut self, now: Now) {
+        self.event(
+            now.utc,
+            EventKind::Station,
+            Level::Normal,
+            About::default(),
+            "the station starts".to_owned(),
+        );
+        for s in 0..self.satellites.len() {
+            self.begin_sealing(now, s);
+            let ids: Vec<CommandId> = self.satellites[s].commands.keys().copied().collect();
+            for id in ids {
+                self.take_up(now, s, id);
+            }
+        }
+        self.journal.flush(now.mono, &mut self.effects);
+    }
+
+    fn begin_sealing(&mut self, now: Now, s: usize) {
+        let Some(sealer) = &self.satellites[s].sealer else { return };
+        let key = sealer.id;
+        if let Some(counter) = sealer.witness_to_raise() {
+            self.effects.push_back(Effect::Witness { key, counter });
+        }
+        if sealer.is_locked_by_witness()
+            && let Some(lock) = sealer.lock(true)
+        {
+            let about = About { key: Some(key), ..About::default() };
+            let message = format!("nothing is sealed with key {key}: {lock}");
+            self.event(now.utc, EventKind::Sealing, Level::Critical, about, message);
+        }
+    }
+
+    /// A command of the last life goes on: `sealed` with the same bytes, `radiating` as unknown, `radiated` waiting.
+    fn take_up(&mut self, now: Now, s: usize, id: CommandId) {
+        let Some(command) = self.satellites[s].commands.get(&id) else { return };
+        let (stage, stage_at, tag) = (command.stage, command.stage_at, command.tag);
+        let telecommand = command.record.telecommand.clone();
+        let Some(l) = self.link_index(&command.record.route.link) else { return };
+        if !matches!(stage, Stage::Radiating | Stage::Radiated) {
+            return;
+        }
+        // The satellite may be answering at this moment.
+        let answer_us = self.answer_us(s, l, &telecommand) + self.links[l].margin_us();
+        let send_us = if stage == Stage::Radiating { self.links[l].config.timing.uplink_us() } else { 0 };
+        let total = i64::try_from(answer_us + send_us).unwrap_or(i64::MAX);
+        let deadline = mono_of(now, stage_at.plus(total));
+        let sat = &mut self.satellites[s];
+        sat.contact.quiet_until = sat.contact.quiet_until.max(deadline.min(now.mono.plus(180_000_000)));
+        if stage == Stage::Radiating {
+            self.unanswered(now, s, id, "the station stopped while it was handed to the radio");
+            return;
+        }
+        let Some(tag) = tag else { return };
+        let answer = telecommand.answer();
+        let settle = mono_of(now, stage_at).plus(3 * sat.profile.heartbeat_period_us);
+        let deadline = if answer == protocol::Answer::None { settle } else { deadline };
+        sat.settling.push(Settling { command: id, tag, answer, busy_until: None, deadline });
+    }
+}

@@ -1,0 +1,226 @@
+//! Counters: which one a frame may be sealed with, and when none may be.
+
+use protocol::{Counter, Key, KeyId};
+
+use super::journal::Ticket;
+use crate::clock::UtcUs;
+use crate::config::CounterRule;
+use crate::snapshot::{KeySnapshot, Witness};
+
+/// A clock further ahead of the last counter than this needs somebody who vouches for it.
+const UNVOUCHED_LEAP_US: u64 = 48 * 3600 * 1_000_000;
+
+/// Why nothing is sealed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Lock {
+    #[error(
+        "the witness stands at {witness}, the database at {database:?}: the database went back (a restored backup?). Confirm the counter to go on above the witness"
+    )]
+    WitnessAhead { database: Option<u64>, witness: u64 },
+    #[error(
+        "the witness file is missing, but counters up to {database} were used. Confirm the counter if the file was lost"
+    )]
+    WitnessMissing { database: u64 },
+    #[error("the witness file cannot be read ({0}). Confirm the counter if the file was damaged")]
+    WitnessDamaged(String),
+    #[error("the witness could not be raised: {0}")]
+    WitnessStuck(String),
+    #[error("no counter was used yet and nobody vouches for the clock: synchronise it, or vouch for it")]
+    NoVoucher,
+    #[error("the counter of this key is used up: take a new key")]
+    Exhausted,
+}
+
+/// The counters of one key.
+#[derive(Debug)]
+pub(super) struct Sealer {
+    pub(super) key: Key,
+    pub(super) id: KeyId,
+    rule: CounterRule,
+    last: Option<Counter>,
+    witness: Option<Counter>,
+    lock: Option<Lock>,
+    /// An operator confirmed: the floor waits for its batch, then for the witness.
+    pub(super) unlocking: Option<(Ticket, Counter)>,
+    /// The witness was asked to follow the confirmed floor.
+    pub(super) unlock_asked: bool,
+    /// The leap was told already.
+    pub(super) leap_told: bool,
+}
+
+/// A counter to seal with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Permit {
+    pub(super) counter: Counter,
+    /// The clock leapt further than anybody vouches for: last + 1 was taken instead.
+    pub(super) leapt: bool,
+}
+
+impl Sealer {
+    /// The counters of a key as the last life left them.
+    pub(super) fn new(key: Key, rule: CounterRule, found: Option<&KeySnapshot>) -> Self {
+        let id = key.id();
+        let database = found.and_then(|k| k.counter);
+        let witness = found.map_or(Witness::Missing, |k| k.witness.clone());
+        let mut sealer = Self {
+            key,
+            id,
+            rule,
+            last: database,
+            witness: None,
+            lock: None,
+            unlocking: None,
+            unlock_asked: false,
+            leap_told: false,
+        };
+        match (database, witness) {
+            (None, Witness::Missing) => {}
+            (Some(database), Witness::Missing) => {
+                sealer.lock = Some(Lock::WitnessMissing { database: database.0 });
+            }
+            (_, Witness::Damaged(why)) => sealer.lock = Some(Lock::WitnessDamaged(why)),
+            (database, Witness::At(witness)) => {
+                sealer.witness = Some(witness);
+                if database.is_none_or(|d| d < witness) {
+                    sealer.lock =
+                        Some(Lock::WitnessAhead { database: database.map(|d| d.0), witness: witness.0 });
+                }
+            }
+        }
+        sealer
+    }
+
+    /// The database is ahead of the witness: it is raised without a word.
+    pub(super) fn witness_to_raise(&self) -> Option<Counter> {
+        match (self.lock.as_ref(), self.last, self.witness) {
+            (None, Some(last), Some(witness)) if witness < last => Some(last),
+            _ => None,
+        }
+    }
+
+    /// Why nothing is sealed now.
+    pub(super) fn lock(&self, vouched: bool) -> Option<Lock> {
+        match &self.lock {
+            Some(lock) => Some(lock.clone()),
+            None if self.last.is_none() && !vouched => Some(Lock::NoVoucher),
+            None if self.last == Some(Counter(u64::MAX)) => Some(Lock::Exhausted),
+            None => None,
+        }
+    }
+
+    /// Whether an operator can unlock it.
+    pub(super) fn is_locked_by_witness(&self) -> bool {
+        self.lock.is_some()
+    }
+
+    /// The counter for the next frame.
+    pub(super) fn permit(&self, utc: UtcUs, vouched: bool) -> Result<Permit, Lock> {
+        if let Some(lock) = self.lock(vouched) {
+            return Err(lock);
+        }
+        let clock = u64::try_from(utc.0).unwrap_or(0);
+        let Some(last) = self.last else {
+            let first = match self.rule {
+                CounterRule::Time => clock.max(1),
+                CounterRule::Sequence => 1,
+            };
+            return Ok(Permit { counter: Counter(first), leapt: false });
+        };
+        let next = last.0.checked_add(1).ok_or(Lock::Exhausted)?;
+        Ok(match self.rule {
+            CounterRule::Sequence => Permit { counter: Counter(next), leapt: false },
+            CounterRule::Time if clock > last.0.saturating_add(UNVOUCHED_LEAP_US) && !vouched => {
+                Permit { counter: Counter(next), leapt: true }
+            }
+            CounterRule::Time => Permit { counter: Counter(next.max(clock)), leapt: false },
+        })
+    }
+
+    /// The counter is spent, whatever becomes of the frame.
+    pub(super) fn spend(&mut self, counter: Counter) {
+        self.last = self.last.max(Some(counter));
+    }
+
+    /// The witness stands here now.
+    pub(super) fn witness_done(&mut self, counter: Counter) {
+        self.witness = self.witness.max(Some(counter));
+        if matches!(self.lock, Some(Lock::WitnessStuck(_))) {
+            self.lock = None;
+        }
+        if self.unlocking.is_some_and(|(_, floor)| floor <= counter) {
+            self.unlocking = None;
+            self.lock = None;
+        }
+    }
+
+    /// The witness could not be raised.
+    pub(super) fn witness_failed(&mut self, why: &str) {
+        if self.lock.is_none() {
+            self.lock = Some(Lock::WitnessStuck(why.to_owned()));
+        }
+    }
+
+    /// Above this an operator lets us go on.
+    pub(super) fn floor(&self, utc: UtcUs, vouched: bool) -> Counter {
+        let clock = match self.rule {
+            CounterRule::Time if vouched => Some(Counter(u64::try_from(utc.0).unwrap_or(0))),
+            _ => None,
+        };
+        self.last.max(self.witness).max(clock).unwrap_or(Counter(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: UtcUs = UtcUs(1_800_000_000_000_000);
+
+    fn sealer(rule: CounterRule, counter: Option<u64>, witness: Witness) -> Sealer {
+        let key = Key::from_bytes([7; 16]);
+        let found = KeySnapshot { key: key.id(), counter: counter.map(Counter), witness };
+        Sealer::new(key, rule, Some(&found))
+    }
+
+    #[test]
+    fn no_counter_and_no_voucher_is_a_refusal() {
+        let fresh = sealer(CounterRule::Time, None, Witness::Missing);
+        assert_eq!(fresh.permit(NOW, false), Err(Lock::NoVoucher));
+        assert_eq!(fresh.permit(NOW, true).map(|p| p.counter.0), Ok(1_800_000_000_000_000));
+    }
+
+    #[test]
+    fn a_database_that_went_back_locks_until_confirmed() {
+        let mut locked = sealer(CounterRule::Time, Some(10), Witness::At(Counter(20)));
+        assert!(matches!(locked.permit(NOW, true), Err(Lock::WitnessAhead { .. })));
+        let floor = locked.floor(UtcUs(0), false);
+        assert_eq!(floor, Counter(20));
+        locked.unlocking = Some((super::super::journal::Journal::default().ticket(), floor));
+        locked.spend(floor);
+        locked.witness_done(floor);
+        assert_eq!(locked.permit(UtcUs(0), false).map(|p| p.counter.0), Ok(21));
+    }
+
+    #[test]
+    fn a_missing_witness_beside_counters_locks_and_one_behind_is_raised_silently() {
+        assert!(sealer(CounterRule::Time, Some(10), Witness::Missing).lock(true).is_some());
+        assert!(sealer(CounterRule::Time, None, Witness::At(Counter(3))).lock(true).is_some());
+        assert!(sealer(CounterRule::Time, None, Witness::Damaged("torn".into())).lock(true).is_some());
+        let behind = sealer(CounterRule::Time, Some(10), Witness::At(Counter(9)));
+        assert_eq!((behind.lock(false), behind.witness_to_raise()), (None, Some(Counter(10))));
+    }
+
+    #[test]
+    fn a_clock_thrown_ahead_does_not_poison_the_counter() {
+        let last = 1_700_000_000_000_000;
+        let sealer = sealer(CounterRule::Time, Some(last), Witness::At(Counter(last)));
+        let permit = sealer.permit(NOW, false).unwrap();
+        assert_eq!((permit.counter.0, permit.leapt), (last + 1, true));
+        assert_eq!(sealer.permit(NOW, true).unwrap().counter.0, 1_800_000_000_000_000);
+        assert_eq!(
+            sealer.permit(UtcUs(5), true).unwrap().counter.0,
+            last + 1,
+            "a clock behind never goes back"
+        );
+    }
+}
