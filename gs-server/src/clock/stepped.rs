@@ -262,7 +262,8 @@ impl Timer for SteppedClock {
         let mut state = self.shared.lock();
         let number = state.next_number;
         state.next_number += 1;
-        state.sleepers.push(Reverse(Sleeper { at_us: at.0.max(state.now_us), number, wake }));
+        let at_us = at.0.max(state.now_us);
+        state.sleepers.push(Reverse(Sleeper { at_us, number, wake }));
         drop(state);
         self.shared.changed.notify_all();
         async move {
@@ -277,5 +278,155 @@ impl Timer for SteppedClock {
 
     fn busy(&self, who: &'static str) -> BusyToken {
         BusyToken::of(Arc::clone(&self.shared) as Arc<dyn Holds>, who)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::{ByteGauge, Wire};
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use tokio::sync::mpsc;
+
+    fn clock(speed: Option<f64>) -> SteppedClock {
+        SteppedClock::new(SteppedOptions { utc_at_origin: UtcUs(1_000_000), speed }).unwrap()
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+    async fn a_year_of_waiting_takes_no_time_and_stops_at_each_wake_up() {
+        let clock = clock(None);
+        for day in 1..=365u64 {
+            let at = MonoUs(day * 86_400_000_000);
+            let _awake = clock.sleep_until(at).await;
+            assert_eq!(clock.now().mono, at);
+        }
+    }
+
+    /// Actors pass a message round a ring, each waiting its own time; whoever looked at the clock too early or was
+    /// overtaken by it would read another time than the sum of all waits so far.
+    #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+    async fn time_never_overtakes_a_message() {
+        let clock = clock(None);
+        let start = clock.busy("set-up");
+        let (first, mut from) = mpsc::channel::<(u64, BusyToken)>(1);
+        for wait in 1..=8u64 {
+            let (into, next) = mpsc::channel(1);
+            let mut inbox = std::mem::replace(&mut from, next);
+            let clock = clock.clone();
+            tokio::spawn(async move {
+                while let Some((sum, token)) = inbox.recv().await {
+                    assert_eq!(clock.now().mono.0, sum, "the clock ran on while a message was under way");
+                    let sleep = clock.sleep_until(MonoUs(sum + wait * 7));
+                    drop(token);
+                    let awake = sleep.await;
+                    tokio::task::yield_now().await;
+                    assert_eq!(clock.now().mono.0, sum + wait * 7);
+                    if into.send((sum + wait * 7, awake)).await.is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        let round = (1..=8u64).map(|w| w * 7).sum::<u64>();
+        first.send((0, start)).await.unwrap();
+        for n in 1..=500u64 {
+            let (sum, token) = from.recv().await.unwrap();
+            assert_eq!(sum, n * round);
+            first.send((sum, token)).await.unwrap();
+        }
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+    async fn it_stands_still_while_somebody_is_busy() {
+        let clock = clock(None);
+        let busy = clock.busy("test");
+        let sleep = clock.sleep_until(MonoUs(10));
+        crate::clock::wall_sleep(Duration::from_millis(20)).await;
+        assert_eq!(clock.now().mono.0, 0);
+        assert_eq!(clock.holders(), [("test", 1)]);
+        let second = busy.clone();
+        drop(busy);
+        crate::clock::wall_sleep(Duration::from_millis(20)).await;
+        assert_eq!(clock.now().mono.0, 0, "a copied token holds by itself");
+        drop(second);
+        let _awake = sleep.await;
+        assert_eq!(clock.now().mono.0, 10);
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn a_sleeper_that_was_dropped_is_not_waited_for() {
+        let clock = clock(None);
+        let start = clock.busy("set-up");
+        let never = clock.sleep_until(MonoUs(5));
+        let sleep = clock.sleep_until(MonoUs(50));
+        drop(never);
+        drop(start);
+        let _awake = sleep.await;
+        assert_eq!(clock.now().mono.0, 50);
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn a_sleeper_that_was_woken_but_dropped_lets_the_clock_go() {
+        let clock = clock(None);
+        let woken = clock.sleep_until(MonoUs(5));
+        while clock.now().mono.0 < 5 {
+            tokio::task::yield_now().await;
+        }
+        drop(woken);
+        let _awake = clock.sleep_until(MonoUs(6)).await;
+        assert_eq!(clock.now().mono.0, 6);
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn the_ceiling_holds_except_where_it_is_skipped() {
+        let clock = clock(Some(100.0));
+        let wall = wall_now();
+        let awake = clock.sleep_until(MonoUs(5_000_000)).await;
+        assert!(wall.elapsed() >= Duration::from_millis(49), "{:?}", wall.elapsed());
+        clock.skip_until(MonoUs(3_600_000_000));
+        let wall = wall_now();
+        let sleep = clock.sleep_until(MonoUs(3_600_000_000));
+        drop(awake);
+        let awake = sleep.await;
+        assert!(wall.elapsed() < Duration::from_secs(2));
+        let wall = wall_now();
+        let sleep = clock.sleep_until(MonoUs(3_605_000_000));
+        drop(awake);
+        let _awake = sleep.await;
+        assert!(wall.elapsed() >= Duration::from_millis(49), "{:?}", wall.elapsed());
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+    async fn bytes_that_nobody_read_hold_the_clock() {
+        let clock = clock(None);
+        let timer: Arc<dyn Timer> = Arc::new(clock.clone());
+        let gauge = ByteGauge::new(Arc::clone(&timer), "wire");
+        let start = clock.busy("set-up");
+        gauge.wrote(3);
+        let sleep = clock.sleep_until(MonoUs(1));
+        drop(start);
+        crate::clock::wall_sleep(Duration::from_millis(10)).await;
+        assert_eq!((clock.now().mono.0, gauge.under_way()), (0, 3));
+        gauge.read(2);
+        crate::clock::wall_sleep(Duration::from_millis(10)).await;
+        assert_eq!(clock.now().mono.0, 0);
+        gauge.read(1);
+        let _awake = sleep.await;
+        let wire = Wire::new(&timer);
+        wire.from_host.wrote(9);
+        wire.from_host.abandon();
+        assert_eq!(wire.from_host.under_way(), 0);
+    }
+
+    #[test]
+    fn the_thread_ends_with_the_clock() {
+        let clock = clock(None);
+        let shared = Arc::downgrade(&clock.shared);
+        let count = AtomicU64::new(0);
+        drop(clock);
+        while shared.upgrade().is_some() && count.fetch_add(1, Ordering::Relaxed) < 1_000_000 {
+            std::thread::yield_now();
+        }
+        assert!(shared.upgrade().is_none());
     }
 }
