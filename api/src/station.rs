@@ -23,8 +23,8 @@ pub struct StationView {
     pub sealing: Vec<SealingView>,
     /// Storage.
     pub storage: StorageView,
-    /// What a demo wants to tell of itself.
-    pub demo: Option<DemoView>,
+    /// What a demo tells of itself (speed, seed, loss); for people, of no fixed shape.
+    pub demo: Option<serde_json::Value>,
 }
 
 /// One satellite now.
@@ -124,15 +124,4 @@ pub struct StorageView {
     pub derived_dropped: u64,
     /// Raw frames that found no place since the start.
     pub frames_lost: u64,
-}
-
-/// What a demo tells of itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DemoView {
-    /// How many simulated seconds pass in one, at most.
-    pub speed: f64,
-    /// Seed of its randomness.
-    pub seed: u64,
-    /// Probability that a packet is lost.
-    pub loss: f64,
 }

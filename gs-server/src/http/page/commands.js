@@ -1,0 +1,115 @@
+// Telecommands and their stage lights; the hands that send. Enter never sends to the satellite: firing is a held key.
+import { get, hasToken, keepToken, post } from "./api.js";
+import { atMostEvery, byId, make, say } from "./dom.js";
+import { model, satellite } from "./model.js";
+
+const HOLD_MS = 800;
+const LIGHTS = ["queued", "sealed", "radiated", "answered"];
+// How many lights a last stage proves; the stages that end badly colour the last of them.
+const REACHED = { queued: 1, sealed: 2, radiating: 2, radiated: 3, answered: 4, rejected: 4, unknown: 3, failed: 1, expired: 1, cancelled: 1 };
+const BAD = ["rejected", "unknown", "failed", "expired"];
+const GOING = ["queued", "sealed", "radiating", "radiated"];
+
+export const refreshCommands = atMostEvery(500, async () => {
+  const s = satellite();
+  if (!s) return;
+  const page = await get(`commands?limit=40&satellite=${encodeURIComponent(s.satellite)}`);
+  byId("command-list").replaceChildren(...page.items.map(row));
+});
+
+function row(command) {
+  const li = make("li", "command");
+  if (!GOING.includes(command.stage)) li.classList.add("over");
+  li.append(make("span", "id", `#${command.id}`));
+  const args = Object.entries(command.arguments).map(([name, value]) => `${name} ${JSON.stringify(value)}`).join(", ");
+  const what = make("span", "what", args ? `${command.command} ${args}` : command.command);
+  what.title = `${command.command} ${args}\nby ${command.principal}, attempt ${command.attempt} of ${command.attempts_allowed}`;
+  li.append(what, lights(command), make("span", BAD.includes(command.stage) ? "word bad" : "word", command.stage));
+  return li;
+}
+
+function lights(command) {
+  const box = make("span", "lights");
+  box.setAttribute("role", "img");
+  box.setAttribute("aria-label", `stage ${command.stage}`);
+  box.title = `queued – sealed – radiated – answered: ${command.stage}`;
+  const reached = REACHED[command.stage] ?? 0;
+  LIGHTS.forEach((_, i) => {
+    const light = make("i");
+    if (i < reached) light.classList.add("lit");
+    if (i === reached - 1 && BAD.includes(command.stage)) light.classList.add("bad");
+    else if (i === reached - 1 && GOING.includes(command.stage)) light.classList.add("now");
+    box.append(light);
+  });
+  return box;
+}
+
+export function paintCommands() {
+  const s = satellite();
+  say(byId("queued"), s && s.queued > 0 ? `${s.queued} waiting` : "");
+  const ready = hasToken() && model.live;
+  byId("ping").disabled = !ready;
+  byId("download").disabled = !ready || Boolean(s?.download);
+  say(byId("download"), s?.download ? "Bringing image home" : "Hold: Bring image home");
+  byId("token-form").hidden = hasToken();
+  byId("forget").hidden = !hasToken();
+}
+
+export function wireHands() {
+  onHold(byId("ping"), () => send("commands", { satellite: satellite()?.satellite, command: "Ping" }, (o) => `Ping is queued as #${o.command}.`));
+  onHold(byId("download"), () => send("downloads", { satellite: satellite()?.satellite }, (o) => `Download ${o.download} is ordered.`));
+  byId("token-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    keepToken(byId("token").value);
+    byId("token").value = "";
+    paintCommands();
+  });
+  byId("forget").addEventListener("click", () => {
+    keepToken("");
+    say(byId("command-note"), "Token forgotten.");
+    paintCommands();
+  });
+}
+
+async function send(path, body, told) {
+  const note = byId("command-note");
+  say(note, "Sending …");
+  try {
+    say(note, told(await post(path, body)));
+    refreshCommands();
+  } catch (error) {
+    if (error.status === 401) keepToken("");
+    say(note, error.message);
+    paintCommands();
+  }
+}
+
+/** Fires after the pointer or the space bar was held for 0.8 s; leaving, Esc or letting go is away from danger. */
+function onHold(button, fire) {
+  let timer = null;
+  const begin = () => {
+    if (button.disabled || timer !== null) return;
+    button.classList.add("holding");
+    timer = setTimeout(() => {
+      end();
+      fire();
+    }, HOLD_MS);
+  };
+  const end = () => {
+    clearTimeout(timer);
+    timer = null;
+    button.classList.remove("holding");
+  };
+  button.addEventListener("pointerdown", begin);
+  for (const type of ["pointerup", "pointerleave", "pointercancel", "blur"]) button.addEventListener(type, end);
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") event.preventDefault();
+    else if (event.key === "Escape") end();
+    else if (event.key === " ") {
+      event.preventDefault();
+      if (!event.repeat) begin();
+    }
+  });
+  button.addEventListener("keyup", end);
+}

@@ -1,0 +1,97 @@
+// The first page: reads without a token, follows the stream, paints what it knows.
+import { get, takeTokenFromAddress } from "./api.js";
+import { paintCommands, refreshCommands, wireHands } from "./commands.js";
+import { addEvent, resetEvents } from "./events.js";
+import { paintHeartbeat, refreshHeartbeat } from "./heartbeat.js";
+import { paintLinks } from "./links.js";
+import { model, satellite, takeStation } from "./model.js";
+import { paintNotice } from "./notice.js";
+import { paintGrid, refreshPicture, resetPicture } from "./picture.js";
+import { follow } from "./stream.js";
+import { paintTop } from "./top.js";
+
+takeTokenFromAddress();
+wireHands();
+// A printed address that is pasted into an open tab changes the fragment only.
+window.addEventListener("hashchange", () => {
+  takeTokenFromAddress();
+  paintCommands();
+});
+window.addEventListener("resize", paintGrid);
+
+function paint() {
+  paintTop();
+  paintHeartbeat();
+  paintCommands();
+  paintLinks();
+  paintNotice();
+}
+
+let imageSeen = "";
+
+function onStatus(station) {
+  takeStation(station);
+  const progress = JSON.stringify(satellite()?.image ?? null);
+  if (progress !== imageSeen) {
+    imageSeen = progress;
+    refreshPicture();
+  }
+  paint();
+}
+
+function onEvent(event) {
+  addEvent(event);
+  if (event.kind === "frame-heard") refreshHeartbeat();
+  if (event.kind === "command-stage") refreshCommands();
+  if (event.image !== null) refreshPicture();
+}
+
+function refreshAll() {
+  refreshHeartbeat();
+  refreshCommands();
+  refreshPicture();
+}
+
+async function begin() {
+  const [station, events] = await Promise.all([get("station"), get("events?limit=100")]);
+  takeStation(station);
+  for (const event of events.items.toReversed()) addEvent(event);
+  refreshAll();
+  paint();
+  follow(events.items[0]?.sequence ?? 0, {
+    event: onEvent,
+    status: onStatus,
+    open() {
+      model.live = true;
+      model.awaySince = null;
+      refreshAll();
+      paint();
+    },
+    away() {
+      model.live = false;
+      model.awaySince ??= Date.now();
+      paint();
+    },
+    reset() {
+      resetEvents();
+      resetPicture();
+      imageSeen = "";
+    },
+  });
+  setInterval(paint, 500);
+}
+
+async function beginUntilItWorks() {
+  for (;;) {
+    try {
+      await begin();
+      return;
+    } catch {
+      model.awaySince ??= Date.now();
+      paintNotice();
+      await new Promise((done) => setTimeout(done, 2000));
+    }
+  }
+}
+
+beginUntilItWorks();

@@ -1,0 +1,23 @@
+// What must be known at once: the server is away, sealing is locked, storage fails. No dialog covers live data.
+import { byId, say } from "./dom.js";
+import { clock } from "./format.js";
+import { model } from "./model.js";
+
+export function paintNotice() {
+  const lines = [];
+  if (model.awaySince !== null) {
+    lines.push(`The server is away since ${clock(model.awaySince)} UTC. What you see is old. Trying again by itself.`);
+  }
+  const { station } = model;
+  if (station?.storage.failing) lines.push(`Storage: ${station.storage.failing}`);
+  for (const s of station?.sealing ?? []) {
+    if (s.locked) lines.push(`Key ${s.key}: ${s.locked}`);
+  }
+  const notice = byId("notice");
+  notice.hidden = lines.length === 0;
+  say(notice, lines.join("\n"));
+  document.body.classList.toggle("old-data", model.awaySince !== null);
+  const connection = byId("connection");
+  connection.classList.toggle("away", !model.live);
+  say(connection, model.live ? "● live" : model.awaySince === null ? "connecting" : "○ server away");
+}
