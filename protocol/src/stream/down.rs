@@ -10,11 +10,12 @@
 //!   and nothing more is said.
 //! - A candidate is *around* a frame as long as it could still become a frame that follows the ICD: before its short
 //!   form is decided; after that while every byte behind its payload is zero, as padding is, or if its header makes no
-//!   sense and the bytes may mean anything; and never once a valid frame overlaps its beginning. So the frame after a
-//!   damaged or cut one is nested only if it lies wholly within what the damaged one's header claims as its payload,
-//!   and then for at most the bytes missing to that candidate's 240. [`DownDecoder::silence`] ends even that when the
-//!   caller knows the line has gone quiet. The price: a valid 240-byte frame that breaks the ICD by carrying a frame in
-//!   its padding is emitted like every other, but after the inner one, which has counted by then.
+//!   sense and the bytes may mean anything; and never once a valid frame overlaps its beginning or another magic stands
+//!   in place of its CRC and header. So the frame after a damaged or cut one is nested only if it lies wholly within
+//!   what the damaged one's header claims as its payload, and then for at most the bytes missing to that candidate's
+//!   240. [`DownDecoder::silence`] ends even that when the caller knows the line has gone quiet. The price: around a
+//!   valid 240-byte frame that breaks the ICD by padding with other bytes than zero, frames inside count; all are
+//!   emitted.
 //! - RSSI: with `rssi`, the byte directly after an accepted frame that counts is its RSSI unless it is `P`.
 //!
 //! Memory is bounded by construction: magics do not overlap, so fewer than 30 candidates are open at a time.
@@ -156,15 +157,16 @@ struct Candidate {
     /// Position of the end of what it waits for.
     due: u64,
     stage: Stage,
-    /// It begins inside a valid frame.
-    is_overlapped: bool,
+    /// It begins inside a valid frame, or a magic stands where its CRC and header should: hardly a frame around others,
+    /// though its CRC may still say otherwise.
+    is_refuted: bool,
 }
 
 impl Candidate {
     /// Whether a frame inside may be part of it, see the rules.
     const fn is_around(&self) -> bool {
         match self.stage {
-            _ if self.is_overlapped => false,
+            _ if self.is_refuted => false,
             Stage::Header | Stage::Short { .. } | Stage::FullSenseless => true,
             Stage::Full { padding_clean, .. } => padding_clean,
         }
@@ -247,8 +249,13 @@ impl Search {
             let reached = if let Some(found) = found {
                 let start = self.scanned + found as u64;
                 self.scanned = start + MAGIC_LEN as u64;
-                let (due, is_overlapped) = (start + SHORT_OVERHEAD as u64, start < self.last.1);
-                let candidate = Candidate { start, due, stage: Stage::Header, is_overlapped };
+                let (due, is_refuted) = (start + SHORT_OVERHEAD as u64, start < self.last.1);
+                if let Some(before) = self.open.last_mut()
+                    && start < before.start + SHORT_OVERHEAD as u64
+                {
+                    before.is_refuted = true;
+                }
+                let candidate = Candidate { start, due, stage: Stage::Header, is_refuted };
                 let full = self.open.push(candidate).is_err();
                 debug_assert!(!full, "magics do not overlap");
                 self.scanned
@@ -322,7 +329,7 @@ impl Search {
         // What lies inside this frame is part of it for good, and what began inside it is no frame around others.
         self.pending.retain(|pending| pending.start < start);
         let (earlier, later) = self.open.split_at_mut(before);
-        later.iter_mut().for_each(|candidate| candidate.is_overlapped = true);
+        later.iter_mut().for_each(|candidate| candidate.is_refuted = true);
         let is_inside_last = self.last.1 == end;
         let mut is_inside_open = false;
         for candidate in earlier {
