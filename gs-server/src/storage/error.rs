@@ -1,0 +1,140 @@
+//! What can go wrong with the database, told so that the reader knows what to do next.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why storage did not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// Another server works in this folder.
+    #[error("{} is in use by another server{}: stop that one, or use another --data", folder.display(), process(*.holder))]
+    Locked {
+        /// The data folder.
+        folder: PathBuf,
+        /// The process that holds it, when it left its number.
+        holder: Option<u32>,
+    },
+    /// The file is no database any more, or a value in it is not what was written.
+    #[error(
+        "the database is damaged ({found}): put a backup in its place, or move the file away and import its frames"
+    )]
+    Damaged {
+        /// What was noticed.
+        found: String,
+    },
+    /// A newer version of this program made the database.
+    #[error(
+        "the database has schema {found}, this program knows up to {known}: start the newer program that made it"
+    )]
+    NewerSchema {
+        /// The newest step that was applied to the file.
+        found: i64,
+        /// The newest step that this program has.
+        known: i64,
+    },
+    /// Something simulated and something real would meet in one folder.
+    #[error("{} was made by a {}: use another --data", folder.display(), if *.simulated { "simulation" } else { "real station" })]
+    SimulatedMark {
+        /// The data folder.
+        folder: PathBuf,
+        /// What the folder is.
+        simulated: bool,
+    },
+    /// The operating system does not let us.
+    #[error("no permission for {}: make this user its owner (chown), or use another --data", path.display())]
+    Permission {
+        /// For what.
+        path: PathBuf,
+    },
+    /// There is no room.
+    #[error("the disk is full, or the database has reached its size limit: make room; it goes on by itself")]
+    Full,
+    /// The device failed.
+    #[error("reading or writing {what} failed: look at the disk and its cable")]
+    Io {
+        /// What was read or written.
+        what: String,
+        /// What the system said.
+        #[source]
+        source: io::Error,
+    },
+    /// The records contradict what is stored: a nonce for the second time, a row that nobody made. Nothing was stored.
+    #[error("the records contradict the database: {0}")]
+    Conflict(String),
+    /// A number that the database has no room for.
+    #[error("{what} {value} is out of range: the database holds numbers up to 9223372036854775807")]
+    OutOfRange {
+        /// Which.
+        what: &'static str,
+        /// The number.
+        value: u64,
+    },
+    /// Anything else that the database says.
+    #[error("the database refused")]
+    Database(#[source] sqlx::Error),
+}
+
+fn process(holder: Option<u32>) -> String {
+    holder.map(|pid| format!(" (process {pid})")).unwrap_or_default()
+}
+
+impl StoreError {
+    /// Whether the same call may succeed later, without anybody changing what is asked.
+    pub fn is_temporary(&self) -> bool {
+        matches!(self, Self::Full | Self::Io { .. })
+    }
+
+    /// An error of the file system, for this path.
+    pub(crate) fn from_io(path: &Path, source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                Self::Permission { path: path.to_path_buf() }
+            }
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full,
+            _ => Self::Io { what: path.display().to_string(), source },
+        }
+    }
+
+    pub(crate) fn damaged(found: impl Into<String>) -> Self {
+        Self::Damaged { found: found.into() }
+    }
+}
+
+/// Primary result codes, <https://www.sqlite.org/rescode.html>.
+mod code {
+    pub(super) const PERM: i32 = 3;
+    pub(super) const READONLY: i32 = 8;
+    pub(super) const IOERR: i32 = 10;
+    pub(super) const CORRUPT: i32 = 11;
+    pub(super) const FULL: i32 = 13;
+    pub(super) const CANTOPEN: i32 = 14;
+    pub(super) const CONSTRAINT: i32 = 19;
+    pub(super) const NOTADB: i32 = 26;
+}
+
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        match &error {
+            sqlx::Error::Database(inner) => {
+                let extended: i32 = inner.code().and_then(|code| code.parse().ok()).unwrap_or(0);
+                let text = inner.message().to_owned();
+                match extended & 0xff {
+                    code::FULL => Self::Full,
+                    code::IOERR => Self::Io {
+                        what: "the database".into(),
+                        source: io::Error::other(format!("{text} (code {extended})")),
+                    },
+                    code::CORRUPT | code::NOTADB => Self::damaged(text),
+                    code::CONSTRAINT => Self::Conflict(text),
+                    code::PERM | code::READONLY | code::CANTOPEN => {
+                        Self::Permission { path: "the database".into() }
+                    }
+                    _ => Self::Database(error),
+                }
+            }
+            // A value of another type than its column may hold: nobody could have written that.
+            sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_) => Self::damaged(error.to_string()),
+            _ => Self::Database(error),
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The station's memory: one SQLite file in the data folder, and what stands beside it.
+//!
+//! [`Store`] takes the engine's batches ([`Store::apply`]: whole or not at all, durable when it returns), gives back
+//! what a restart needs ([`Store::snapshot`]) and answers questions (`frames`, `telemetry`, `commands`, `images`,
+//! `events` …). Times come in with the records; storage reads no clock and decides nothing.
+//!
+//! The folder holds
+//! - `ground.sqlite3` with its `-wal` and `-shm`: the database;
+//! - `lock`: held while a server works here;
+//! - `reserve.bin`: raw frames while the database takes nothing, see [`reserve`];
+//! - `witness/`: the highest counter of each key, outside the database, see [`crate::witness`].
+//!
+//! What it does **not** do: keep keys, know HTTP, delete anything that was heard or sent.
+
+mod convert;
+mod error;
+mod lock;
+mod open;
+mod read;
+mod redecode;
+pub mod reserve;
+mod row;
+mod rows;
+mod snapshot;
+mod write;
+
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use mission::port::ReservedFrame;
+use mission::{Batch, Principal, SatelliteId, Snapshot};
+use protocol::{Counter, KeyId};
+use sqlx::sqlite::SqlitePool;
+
+use crate::witness::WitnessFolder;
+
+pub use error::StoreError;
+pub use read::{
+    Bucket, ChunkState, CommandLife, CommandNow, CommandQuery, Counts, EventQuery, FrameQuery, Heard,
+    ImageBytes, ImageMap, LatestValue, Page, Sample, Samples, Scope, Series, TelemetryQuery,
+};
+pub use redecode::{RedecodeProgress, RedecodeReport};
+pub use rows::{
+    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, EventRow, FrameRow, ImageRow, IntentRow,
+    LimitRow, MetaRow, ParameterRow, ReceptionRow, SealedRow, StageRow, TelemetryRow,
+};
+
+use reserve::{Reserve, ReserveError};
+
+/// Name of the database in the data folder.
+pub const DATABASE: &str = "ground.sqlite3";
+
+/// Where the station's memory is, and how much of the disk it may take.
+#[derive(Debug, Clone)]
+pub struct StoreOptions {
+    /// The data folder; made with mode 0700 when it does not exist.
+    pub folder: PathBuf,
+    /// Whether what is stored here is made up. The folder is marked at its birth; a mismatch is refused.
+    pub simulated: bool,
+    /// The largest size of the database in pages of 4096 bytes; `None` for SQLite's own limit.
+    pub max_page_count: Option<u32>,
+    /// Size of the reserve for raw frames in bytes, allocated at once; 0 for none.
+    pub reserve_bytes: u64,
+}
+
+/// The station's memory. Cheap to clone; all clones are one store.
+#[derive(Clone)]
+pub struct Store(Arc<Inner>);
+
+struct Inner {
+    folder: PathBuf,
+    simulated: bool,
+    writer: tokio::sync::Mutex<write::Writer>,
+    readers: SqlitePool,
+    witness: WitnessFolder,
+    reserve: Mutex<Option<Reserve>>,
+    // Last: the folder is free only when everything above is closed.
+    _lock: lock::FolderLock,
+}
+
+impl fmt::Debug for Store {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Store").field("folder", &self.0.folder).finish_non_exhaustive()
+    }
+}
+
+/// An event with its place in the one durable sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredEvent {
+    /// Its place; later events have higher numbers, and no number is ever given twice.
+    pub sequence: i64,
+    /// What happened.
+    pub record: mission::record::EventRecord,
+}
+
+/// What became of an intent that came under this key before.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredIntent {
+    /// SHA-256 of the request.
+    pub digest: [u8; 32],
+    /// What was answered.
+    pub accepted: mission::Accepted,
+}
+
+impl Store {
+    /// Opens the memory in this folder, and makes it when there is none.
+    ///
+    /// # Errors
+    /// [`StoreError`]: in use by another server, damaged, made by a newer program, simulated instead of real or the
+    /// other way round, no permission, disk full. The text says what to do.
+    pub async fn open(options: StoreOptions) -> Result<Self, StoreError> {
+        open::open(options).await
+    }
+
+    /// Stores a batch, whole or not at all. What it returns is durable: events with their places, in order.
+    ///
+    /// # Errors
+    /// [`StoreError::Full`] and [`StoreError::Io`] may pass: the next batch is tried afresh. [`StoreError::Conflict`]
+    /// when the records contradict what is stored. Nothing of the batch is stored then.
+    pub async fn apply(&self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
+        self.0.writer.lock().await.apply(batch).await
+    }
+
+    /// What the engine needs to go on: of these satellites and keys, and the highest ids of everything.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database cannot be read or holds what nobody wrote.
+    pub async fn snapshot(&self, satellites: &[SatelliteId], keys: &[KeyId]) -> Result<Snapshot, StoreError> {
+        snapshot::snapshot(self, satellites, keys).await
+    }
+
+    /// What became of the intent that this principal sent under this key, if any.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database cannot be read.
+    pub async fn find_intent(
+        &self,
+        principal: &Principal,
+        idempotency_key: &str,
+    ) -> Result<Option<StoredIntent>, StoreError> {
+        read::find_intent(self, principal, idempotency_key).await
+    }
+
+    /// Makes the derived rows again from the raw frames, and compares everything on the way.
+    ///
+    /// One transaction for some hundred frames; when it is broken off, the next call goes on where this one was.
+    /// `progress` is told after each transaction.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database cannot be read or written.
+    pub async fn redecode(
+        &self,
+        progress: impl FnMut(RedecodeProgress) + Send,
+    ) -> Result<RedecodeReport, StoreError> {
+        redecode::redecode(self, progress).await
+    }
+
+    /// The data folder.
+    pub fn folder(&self) -> &Path {
+        &self.0.folder
+    }
+
+    /// Whether what is stored here is made up.
+    pub fn is_simulated(&self) -> bool {
+        self.0.simulated
+    }
+
+    /// Another limit on the size of the database, in pages of 4096 bytes, from the next batch on.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database does not take it.
+    pub async fn set_max_page_count(&self, pages: u32) -> Result<(), StoreError> {
+        self.0.writer.lock().await.set_max_page_count(pages).await
+    }
+
+    /// The witness of each key.
+    pub fn witness(&self) -> &WitnessFolder {
+        &self.0.witness
+    }
+
+    /// Raises the witness of this key durably; a lower counter changes nothing. Waits for the disk elsewhere.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the file could not be written; the old one stands then.
+    pub async fn raise_witness(&self, key: KeyId, counter: Counter) -> Result<(), StoreError> {
+        let folder = self.0.witness.clone();
+        let path = folder.path().to_path_buf();
+        off_the_loop(move || folder.raise(key, counter))
+            .await?
+            .map_err(|error| StoreError::from_io(&path, error))
+    }
+
+    /// Keeps a raw frame in the reserve, durably, while the database takes nothing.
+    ///
+    /// # Errors
+    /// [`ReserveError`] when the reserve is full or absent, or the disk fails.
+    pub async fn reserve_push(&self, frame: ReservedFrame) -> Result<(), ReserveError> {
+        self.with_reserve(move |reserve| reserve.push(&frame)).await
+    }
+
+    /// All frames in the reserve, oldest first.
+    ///
+    /// # Errors
+    /// [`ReserveError::Io`] when the disk fails. Slots that were torn are skipped.
+    pub async fn reserve_read(&self) -> Result<Vec<ReservedFrame>, ReserveError> {
+        match self.with_reserve(|reserve| reserve.read_all()).await {
+            Err(ReserveError::Absent) => Ok(Vec::new()),
+            result => result,
+        }
+    }
+
+    /// Empties the reserve: what it held is in the database now.
+    ///
+    /// # Errors
+    /// [`ReserveError::Io`] when the disk fails; the frames come back at the next start then.
+    pub async fn reserve_clear(&self) -> Result<(), ReserveError> {
+        match self.with_reserve(Reserve::clear).await {
+            Err(ReserveError::Absent) => Ok(()),
+            result => result,
+        }
+    }
+
+    async fn with_reserve<T: Send + 'static>(
+        &self,
+        act: impl FnOnce(&mut Reserve) -> Result<T, ReserveError> + Send + 'static,
+    ) -> Result<T, ReserveError> {
+        let inner = Arc::clone(&self.0);
+        let act = move || {
+            let mut reserve = inner.reserve.lock().unwrap_or_else(PoisonError::into_inner);
+            reserve.as_mut().map_or(Err(ReserveError::Absent), act)
+        };
+        off_the_loop(act).await.map_err(|error| ReserveError::Io(std::io::Error::other(error)))?
+    }
+
+    /// Moves everything into the one file `ground.sqlite3` and closes it. Calls after this fail.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database cannot be closed in order; nothing that was acknowledged is lost by that.
+    pub async fn close(&self) -> Result<(), StoreError> {
+        self.0.readers.close().await;
+        self.0.writer.lock().await.close().await
+    }
+}
+
+/// Runs what waits for a disk on a thread that may wait.
+async fn off_the_loop<T: Send + 'static>(act: impl FnOnce() -> T + Send + 'static) -> Result<T, StoreError> {
+    tokio::task::spawn_blocking(act).await.map_err(|error| StoreError::Io {
+        what: "the data folder".into(),
+        source: std::io::Error::other(error),
+    })
+}

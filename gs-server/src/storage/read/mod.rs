@@ -1,0 +1,128 @@
+//! Questions to the station's memory: pages of rows, newest first or onwards from a place.
+//!
+//! Readers have connections of their own and never wait for the writer.
+
+mod commands;
+mod events;
+mod frames;
+mod images;
+mod telemetry;
+
+pub use commands::{CommandLife, CommandNow, CommandQuery};
+pub use events::{Counts, EventQuery};
+pub use frames::{FrameQuery, Heard};
+pub use images::{ChunkState, ImageBytes, ImageMap};
+pub use telemetry::{Bucket, LatestValue, Sample, Samples, Series, TelemetryQuery};
+
+pub(super) use events::find_intent;
+
+use sqlx::{QueryBuilder, Sqlite};
+
+use super::row::Row;
+use super::{Store, StoreError};
+
+/// Which part of a list, by the id (or sequence number) of its rows.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Page {
+    /// Only rows behind this one, oldest first.
+    pub after: Option<i64>,
+    /// Only rows before this one, newest first. With `after`: those between, oldest first.
+    pub before: Option<i64>,
+    /// At most so many rows, 1 to 1000; 0 stands for 100.
+    pub limit: u32,
+}
+
+impl Page {
+    fn rows(&self) -> i64 {
+        match self.limit {
+            0 => 100,
+            limit => i64::from(limit.min(1000)),
+        }
+    }
+}
+
+/// Whose rows.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Scope {
+    /// Of this satellite.
+    pub satellite: Option<String>,
+    /// Of this station.
+    pub station: Option<String>,
+    /// Of this link.
+    pub link: Option<String>,
+}
+
+/// A list with conditions; values are bound, never written into the statement.
+struct List {
+    statement: QueryBuilder<Sqlite>,
+}
+
+impl List {
+    fn of<R: Row>() -> Self {
+        Self { statement: QueryBuilder::new(format!("{} where true", R::SELECT)) }
+    }
+
+    fn equal(mut self, column: &'static str, value: Option<&str>) -> Self {
+        if let Some(value) = value {
+            self.statement.push(format_args!(" and {column} = ")).push_bind(value.to_owned());
+        }
+        self
+    }
+
+    fn equal_number(mut self, column: &'static str, value: Option<i64>) -> Self {
+        if let Some(value) = value {
+            self.statement.push(format_args!(" and {column} = ")).push_bind(value);
+        }
+        self
+    }
+
+    fn any_of(mut self, column: &'static str, words: Option<Vec<&'static str>>) -> Self {
+        if let Some(words) = words {
+            self.statement.push(format_args!(" and {column} in ("));
+            let mut list = self.statement.separated(", ");
+            for word in words {
+                list.push_bind(word);
+            }
+            self.statement.push(")");
+        }
+        self
+    }
+
+    fn scope(self, scope: &Scope) -> Self {
+        self.equal("satellite", scope.satellite.as_deref())
+            .equal("station", scope.station.as_deref())
+            .equal("link", scope.link.as_deref())
+    }
+
+    /// The rows of the page, `id` being the column that numbers them.
+    async fn page<R: Row>(
+        mut self,
+        store: &Store,
+        id: &'static str,
+        page: &Page,
+    ) -> Result<Vec<R>, StoreError> {
+        if let Some(after) = page.after {
+            self.statement.push(format_args!(" and {id} > ")).push_bind(after);
+        }
+        if let Some(before) = page.before {
+            self.statement.push(format_args!(" and {id} < ")).push_bind(before);
+        }
+        let order = if page.after.is_some() { "asc" } else { "desc" };
+        self.statement.push(format_args!(" order by {id} {order} limit ")).push_bind(page.rows());
+        let rows = self.statement.build().fetch_all(&store.0.readers).await?;
+        rows.iter().map(R::read).collect()
+    }
+}
+
+/// At most one row.
+async fn one<R: Row>(store: &Store, condition: &'static str, id: i64) -> Result<Option<R>, StoreError> {
+    let row =
+        sqlx::query(super::row::select::<R>(condition)).bind(id).fetch_optional(&store.0.readers).await?;
+    row.as_ref().map(R::read).transpose()
+}
+
+/// All rows that belong to something.
+async fn all<R: Row>(store: &Store, condition: &'static str, id: i64) -> Result<Vec<R>, StoreError> {
+    let rows = sqlx::query(super::row::select::<R>(condition)).bind(id).fetch_all(&store.0.readers).await?;
+    rows.iter().map(R::read).collect()
+}

@@ -1,0 +1,1 @@
+//! Tests of the storage as a whole; each has a folder of its own.
