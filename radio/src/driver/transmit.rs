@@ -39,8 +39,11 @@ struct OnAir {
     written_us: u64,
     /// Computed start of the radiation.
     air_start_us: u64,
-    /// Computed end, ten per cent later than the figures say.
+    /// Computed end, ten per cent later than the figures say; without the ten per cent once AUX has measured.
     end_us: u64,
+    /// What AUX showed, if it rose before the computed end. It is reported, but the air counts as taken until that
+    /// end: a pin that moves by itself must not put two frames on the air.
+    measured_us: Option<u64>,
     low_us: Option<u64>,
     saw_low: bool,
     edges: u32,
@@ -87,6 +90,7 @@ impl Driver {
         if !idle {
             on_air.low_us = Some(now_us);
             on_air.saw_low = true;
+            on_air.measured_us = None;
             return;
         }
         let Some(low_us) = on_air.low_us.take() else { return };
@@ -96,8 +100,9 @@ impl Driver {
             && low_us <= on_air.air_start_us + AUX_LATE_US
             && now_us >= on_air.air_start_us + *air_us / 2;
         if believable {
-            let airtime_us = now_us - low_us.max(on_air.air_start_us);
-            self.transmission_done(airtime_us, true);
+            let nominal_end_us = on_air.air_start_us + *air_us;
+            on_air.measured_us = Some(now_us - low_us.max(on_air.air_start_us));
+            on_air.end_us = on_air.end_us.min(nominal_end_us.max(now_us));
         }
     }
 
@@ -138,8 +143,9 @@ impl Driver {
                     self.transmission_failed(Radiated::Maybe, TxFailure::AuxSilent);
                     self.recover();
                 } else {
-                    let airtime_us = sending.air_us;
-                    self.transmission_done(airtime_us, false);
+                    let measured_us = on_air.measured_us;
+                    let airtime_us = measured_us.unwrap_or(sending.air_us);
+                    self.transmission_done(airtime_us, measured_us.is_some());
                 }
             }
         }
@@ -203,6 +209,7 @@ impl Driver {
             written_us: now_us,
             air_start_us: now_us + lead_in_us,
             end_us,
+            measured_us: None,
             low_us: None,
             saw_low: false,
             edges: 0,

@@ -33,8 +33,8 @@ const MODE_CHANGE_US: u64 = 10_000;
 const MODE_CHANGE_LEAD_US: u64 = 2_000;
 /// AUX goes low this long before the first byte of output.
 const OUTPUT_LEAD_US: u64 = 2_500;
-/// Bytes an adapter hands over at once: a full-speed USB packet of an FTDI chip is 62.
-const PIECE_BYTES: usize = 62;
+/// Bytes handed over at once: 25 ms at 9600 baud, somewhat coarser than an adapter's latency timer of 16 ms makes them.
+const PIECE_BYTES: usize = 24;
 const SPLIT_OUTPUT_US: u64 = 30_000;
 const SPLIT_WRITE_US: u64 = 20_000;
 
