@@ -10,3 +10,5 @@
 
 pub mod clock;
 pub mod config;
+pub mod storage;
+pub mod witness;
