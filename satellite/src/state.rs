@@ -7,7 +7,7 @@ use crate::{AcceptedNonces, JournalEntry, JournalError};
 /// The stored image, as a recipe: the seed and the number make the bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoredImage {
-    /// Number of the picture in the satellite's life, from 0 (the one it was launched with).
+    /// Number of the picture in the satellite's life, from 1; 0 is the one it was launched with.
     pub number: u32,
     /// Size.
     pub resolution: Resolution,
@@ -91,7 +91,7 @@ impl Default for TwinState {
             boots: 0,
             booted_utc_ms: 0,
             image: None,
-            next_image: 0,
+            next_image: 1,
             clock: None,
             transmitter: true,
             elements: false,

@@ -33,10 +33,11 @@ impl Twin {
         self.heartbeat_due_us = self.up_again_us.saturating_add(self.config.first_heartbeat_us);
     }
 
-    /// Found in flight: the rhythm goes on from the boot that the state remembers.
+    /// Found in flight: the rhythm goes on from the boot that the state remembers, to the millisecond.
     pub(super) fn resume(&mut self, now_us: u64) {
         self.up_again_us = now_us;
-        let since_boot_us = self.utc_ms(now_us).saturating_sub(self.state.booted_utc_ms).saturating_mul(1000);
+        let since_boot_ms = self.utc_ms(now_us).saturating_sub(self.state.booted_utc_ms);
+        let since_boot_us = since_boot_ms.saturating_mul(1000).saturating_add(now_us % 1000);
         let first_us = self.config.boot_us.saturating_add(self.config.first_heartbeat_us);
         let period_us = self.config.heartbeat_period_us.max(1);
         let until_next_us = match since_boot_us.checked_sub(first_us) {
