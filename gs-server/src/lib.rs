@@ -10,5 +10,7 @@
 
 pub mod clock;
 pub mod config;
+pub mod decode;
+pub mod keys;
 pub mod storage;
 pub mod witness;
