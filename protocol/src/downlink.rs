@@ -46,10 +46,6 @@ pub mod down_type {
 
 /// One packet from the satellite.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "no heap in this crate; the largest packet is a chunk of 224 bytes"
-)]
 pub enum Downlink {
     /// Answer to a Ping.
     Pong,

@@ -63,7 +63,6 @@ pub mod up_type {
 
 /// One request to the satellite.
 #[derive(Clone, PartialEq, Debug)]
-#[expect(clippy::large_enum_variant, reason = "no heap in this crate; the largest payload is 196 bytes")]
 pub enum Telecommand {
     /// Answered by Pong.
     Ping,

@@ -163,6 +163,26 @@ struct Candidate {
 }
 
 impl Candidate {
+    const fn new(start: u64, is_refuted: bool) -> Self {
+        Self { start, due: start + SHORT_OVERHEAD as u64, stage: Stage::Header, is_refuted }
+    }
+
+    /// Goes on to wait for the end of its first form, if the header is in.
+    fn read_header(&mut self, view: View<'_>) {
+        let head = view.slice(self.start, self.start + SHORT_OVERHEAD as u64);
+        if head.is_empty() {
+            return;
+        }
+        let length = DownFrame::accepted(head).raw_header().length;
+        if usize::from(length) <= DOWN_PAYLOAD_MAX {
+            self.stage = Stage::Short { length };
+            self.due = self.start + SHORT_OVERHEAD as u64 + u64::from(length);
+        } else {
+            self.stage = Stage::FullSenseless;
+            self.due = self.start + FRAME_LEN as u64;
+        }
+    }
+
     /// Whether a frame inside may be part of it, see the rules.
     const fn is_around(&self) -> bool {
         match self.stage {
@@ -249,13 +269,13 @@ impl Search {
             let reached = if let Some(found) = found {
                 let start = self.scanned + found as u64;
                 self.scanned = start + MAGIC_LEN as u64;
-                let (due, is_refuted) = (start + SHORT_OVERHEAD as u64, start < self.last.1);
                 if let Some(before) = self.open.last_mut()
                     && start < before.start + SHORT_OVERHEAD as u64
                 {
                     before.is_refuted = true;
                 }
-                let candidate = Candidate { start, due, stage: Stage::Header, is_refuted };
+                let mut candidate = Candidate::new(start, start < self.last.1);
+                candidate.read_header(view);
                 let full = self.open.push(candidate).is_err();
                 debug_assert!(!full, "magics do not overlap");
                 self.scanned
@@ -286,14 +306,7 @@ impl Search {
         let full_due = start + FRAME_LEN as u64;
         let contents_crc = match candidate.stage {
             Stage::Header => {
-                let length = DownFrame::accepted(frame).raw_header().length;
-                if usize::from(length) <= DOWN_PAYLOAD_MAX {
-                    candidate.stage = Stage::Short { length };
-                    candidate.due = due + u64::from(length);
-                } else {
-                    candidate.stage = Stage::FullSenseless;
-                    candidate.due = full_due;
-                }
+                candidate.read_header(view);
                 return;
             }
             Stage::Short { .. } | Stage::FullSenseless => crc32(&frame[CONTENTS_AT..]),
@@ -421,6 +434,13 @@ impl Covered {
     }
 
     fn add(&mut self, mut from: u64, mut to: u64) {
+        // Frame after frame without a gap.
+        if let [(_, end)] = &mut self.runs[..]
+            && *end == from
+        {
+            *end = to;
+            return;
+        }
         self.runs.retain(|(start, end)| {
             let touches = *start <= to && from <= *end;
             if touches {

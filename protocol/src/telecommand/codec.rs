@@ -201,7 +201,7 @@ impl Telecommand {
 }
 
 fn capture_flags(grey: bool, strong_compression: bool) -> u8 {
-    u8::from(grey) * GREY | u8::from(strong_compression) * STRONG_COMPRESSION
+    (u8::from(grey) * GREY) | (u8::from(strong_compression) * STRONG_COMPRESSION)
 }
 
 fn write_list<T: Wire>(writer: &mut Writer<'_>, entries: &[T]) {
