@@ -42,9 +42,8 @@ pub struct FrameView {
     /// Why it does not decode; only when one frame is asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub undecoded: Option<String>,
-    /// Who heard it; only when one frame is asked for.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub receptions: Option<Vec<ReceptionView>>,
+    /// Who heard it.
+    pub receptions: Vec<ReceptionView>,
 }
 
 /// One station heard one frame.

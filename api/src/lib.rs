@@ -39,7 +39,7 @@ pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
 pub use image::{ChunkMap, ImageView};
 pub use page::{Nothing, Page};
 pub use problem::{FieldError, Problem, ProblemKind};
-pub use station::{DemoView, ImageProgress, LinkView, SatelliteView, SealingView, StationView, StorageView};
+pub use station::{ImageProgress, LinkView, SatelliteView, SealingView, StationView, StorageView};
 pub use stream::StreamMessage;
 pub use telecommand::ArgumentError;
 pub use telemetry::{Bucket, LatestValue, ParameterView, Sample, TelemetryPage};

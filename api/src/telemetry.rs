@@ -14,8 +14,8 @@ pub struct TelemetryPage {
     pub parameter: String,
     /// Unit; empty when it has none or nobody knows it.
     pub unit: String,
-    /// Satellite, when one was asked for.
-    pub satellite: Option<String>,
+    /// Satellite.
+    pub satellite: String,
     /// Begin of the range; `null` when open.
     pub start: Option<Time>,
     /// End of the range, not included; `null` when open.
@@ -43,15 +43,21 @@ pub struct Sample {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Bucket {
     /// Begin of the bucket.
-    pub at: Time,
+    pub start: Time,
+    /// End of the bucket, not included.
+    pub stop: Time,
     /// Least valid value.
     pub min: Option<f64>,
     /// Greatest valid value.
     pub max: Option<f64>,
     /// Mean of the valid values.
     pub avg: Option<f64>,
-    /// Number of values, invalid ones included.
+    /// Number of valid values.
     pub count: u64,
+    /// Number of invalid values.
+    pub invalid: u64,
+    /// The newest value in it, valid or not.
+    pub last: Sample,
 }
 
 /// The newest value of a parameter.

@@ -11,6 +11,9 @@
 pub mod clock;
 pub mod config;
 pub mod decode;
+pub mod engine;
+pub mod http;
+pub mod hub;
 pub mod keys;
 pub mod storage;
 pub mod witness;

@@ -1,0 +1,132 @@
+//! API v1 and the first page, under axum.
+//!
+//! [`routes`] is the table: every path, whether it reads or writes, and who answers. Around all of it lies one guard
+//! (names under which we answer, problems, security headers), around every write another (origin, token, idempotency
+//! key, JSON). One file per group of operations; `problem` is the only place that turns errors into answers.
+//!
+//! Reading needs no token: whoever can reach the port may look. Every write needs the token, on loopback too.
+//!
+//! What it does **not** do: decide anything (intents go to the engine), know SQL (the store answers), read a clock.
+
+mod clock;
+mod commands;
+mod downloads;
+mod events;
+mod extract;
+mod frames;
+mod guard;
+mod hosts;
+mod images;
+mod keys;
+mod links;
+mod page;
+mod problem;
+mod routes;
+mod station;
+mod status;
+mod stream;
+mod telemetry;
+mod token;
+mod write;
+
+#[cfg(test)]
+mod tests;
+
+use std::io;
+use std::sync::Arc;
+
+use axum::Router;
+use axum::middleware::from_fn_with_state;
+use axum::serve::ListenerExt as _;
+use mission::{SatelliteId, StationConfig, StationId};
+use protocol::KeyId;
+use tokio::sync::Semaphore;
+use tokio_util::sync::CancellationToken;
+use tower_http::compression::CompressionLayer;
+
+use crate::clock::Timer;
+use crate::engine::EngineHandle;
+use crate::hub::Hub;
+use crate::storage::Store;
+
+pub use hosts::AllowedHosts;
+pub use token::{Token, TokenError};
+
+/// Streams that may be open at once; more are refused.
+const STREAMS_MAX: usize = 64;
+
+/// Whom the handlers ask.
+#[derive(Clone)]
+pub struct HttpState {
+    /// The archive.
+    pub store: Store,
+    /// The engine: intents and status.
+    pub engine: EngineHandle,
+    /// Committed events as they come.
+    pub hub: Hub,
+    /// The station's time, simulated or not.
+    pub timer: Arc<dyn Timer>,
+    /// What every write must show.
+    pub token: Token,
+    /// Who we are.
+    pub identity: Identity,
+    /// What a demo tells of itself; shown in the station's view.
+    pub demo: Option<serde_json::Value>,
+    /// Cancelled when the server stops: open streams end.
+    pub stop: CancellationToken,
+}
+
+/// Who we are, from the configuration.
+#[derive(Debug, Clone)]
+pub struct Identity {
+    /// The station.
+    pub station: StationId,
+    /// Its satellites with the ids of their keys.
+    pub satellites: Vec<(SatelliteId, Option<KeyId>)>,
+    /// Time, satellite or radio are made up.
+    pub simulated: bool,
+}
+
+impl Identity {
+    /// The identity of a configured station.
+    #[must_use]
+    pub fn of(config: &StationConfig, simulated: bool) -> Self {
+        let satellites =
+            config.satellites.iter().map(|satellite| (satellite.id.clone(), satellite.key.as_ref().map(|key| key.id())));
+        Self { station: config.station.clone(), satellites: satellites.collect(), simulated }
+    }
+}
+
+/// What every handler gets. Cheap to clone.
+#[derive(Clone)]
+struct App {
+    state: Arc<HttpState>,
+    hosts: Arc<AllowedHosts>,
+    streams: Arc<Semaphore>,
+}
+
+/// The API and the page.
+pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
+    let app =
+        App { state: Arc::new(state), hosts: Arc::new(allowed_hosts), streams: Arc::new(Semaphore::new(STREAMS_MAX)) };
+    routes::table()
+        .into_iter()
+        .fold(Router::new(), |router, route| route.add_to(router, &app))
+        .layer(CompressionLayer::new())
+        .layer(from_fn_with_state(app.clone(), guard::guard))
+        .with_state(app)
+}
+
+/// Answers until `stop`; returns when every request that was under way has its answer.
+///
+/// # Errors
+/// When the listener fails.
+pub async fn serve(listener: tokio::net::TcpListener, router: Router, stop: CancellationToken) -> io::Result<()> {
+    // Small messages on a live page: never wait for more to fill a packet.
+    let listener = listener.tap_io(|stream| {
+        if let Err(error) = stream.set_nodelay(true) {
+            tracing::debug!(%error, "A connection keeps Nagle's algorithm.");
+        }
+    });
+    axum::serve(listener, router).with_graceful_shutdown(stop.cancelled_owned()).await
+}

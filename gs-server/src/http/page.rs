@@ -1,0 +1,54 @@
+//! The first page: static files that are compiled in. No request of it leaves this server.
+
+use axum::extract::Path;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use sha2::{Digest as _, Sha256};
+
+use super::problem::Failure;
+
+macro_rules! files {
+    ($($name:literal)*) => {
+        /// Name and content of each file.
+        pub(super) const FILES: &[(&str, &str)] = &[$(($name, include_str!(concat!("page/", $name)))),*];
+    };
+}
+
+files! {
+    "api.js" "commands.js" "console.css" "dom.js" "events.js" "favicon.svg" "format.js" "heartbeat.js" "links.js"
+    "main.js" "model.js" "notice.js" "picture.js" "stream.js" "tokens.css" "top.js"
+}
+
+pub(super) async fn index(headers: HeaderMap) -> Response {
+    answer("text/html; charset=utf-8", include_str!("page/index.html"), &headers)
+}
+
+pub(super) async fn favicon(headers: HeaderMap) -> Response {
+    answer("image/svg+xml", include_str!("page/favicon.svg"), &headers)
+}
+
+pub(super) async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response, Failure> {
+    let found = FILES.iter().find(|(known, _)| *known == name);
+    let (name, content) =
+        found.ok_or_else(|| Failure::new(api::ProblemKind::NotFound, "The page has no such file."))?;
+    let media_type = match name.rsplit_once('.') {
+        Some((_, "css")) => "text/css; charset=utf-8",
+        Some((_, "svg")) => "image/svg+xml",
+        _ => "text/javascript; charset=utf-8",
+    };
+    Ok(answer(media_type, content, &headers))
+}
+
+/// Kept by the browser, but asked for each time: a new server brings its new page at once.
+fn answer(media_type: &'static str, content: &'static str, headers: &HeaderMap) -> Response {
+    let tag = format!("W/\"{}\"", hex::encode(&Sha256::digest(content)[..8]));
+    let is_known = headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes());
+    let mut response = if is_known { StatusCode::NOT_MODIFIED.into_response() } else { content.into_response() };
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(media_type));
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    if let Ok(tag) = HeaderValue::try_from(tag) {
+        headers.insert(header::ETAG, tag);
+    }
+    response
+}

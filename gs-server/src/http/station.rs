@@ -1,0 +1,91 @@
+//! `GET /api/v1/station`: how the station is right now.
+
+use api::{ImageProgress, LinkView, SatelliteView, SealingView, StationView, StorageView};
+use axum::Json;
+use axum::extract::State;
+use mission::status::{LinkStatus, SatelliteStatus};
+use mission::{LinkState, Status, UtcUs};
+
+use super::App;
+use super::extract::time;
+use super::problem::Failure;
+
+pub(super) async fn get(State(app): State<App>) -> Result<Json<StationView>, Failure> {
+    let last_sequence = app.state.store.last_event_seq().await?;
+    Ok(Json(view(&app, &app.state.engine.status(), last_sequence)))
+}
+
+/// The status as the wire has it.
+pub(super) fn view(app: &App, status: &Status, last_sequence: i64) -> StationView {
+    let storage = &status.storage;
+    StationView {
+        station: status.station.to_string(),
+        at: time(app.state.timer.now().utc.0),
+        simulated: app.state.identity.simulated,
+        last_sequence,
+        satellites: status.satellites.iter().map(|satellite| satellite_view(app, satellite)).collect(),
+        links: status.links.iter().map(link_view).collect(),
+        sealing: status
+            .sealing
+            .iter()
+            .map(|sealing| SealingView {
+                key: sealing.key.to_string(),
+                satellite: sealing.satellite.to_string(),
+                locked: sealing.locked.clone(),
+            })
+            .collect(),
+        storage: StorageView {
+            failing: storage.failing.clone(),
+            waiting: storage.waiting as u64,
+            reserved: storage.reserved,
+            derived_dropped: storage.derived_dropped,
+            frames_lost: storage.frames_lost,
+        },
+        demo: app.state.demo.clone(),
+    }
+}
+
+fn satellite_view(app: &App, status: &SatelliteStatus) -> SatelliteView {
+    let at = |utc: Option<UtcUs>| utc.map(|utc| time(utc.0));
+    let identity = app.state.identity.satellites.iter().find(|(id, _)| *id == status.satellite);
+    SatelliteView {
+        satellite: status.satellite.to_string(),
+        key: identity.and_then(|(_, key)| key.map(|key| key.to_string())),
+        heard_at: at(status.heard_at),
+        heartbeat_at: at(status.heartbeat_at),
+        next_heartbeat_at: at(status.next_heartbeat_at),
+        in_contact: status.in_contact,
+        in_view: status.in_view,
+        los_at: at(status.los_at),
+        uplink: status.uplink.clone(),
+        outstanding: status.outstanding.map(|id| id.0),
+        queued: status.queued as u64,
+        image: status.image.as_ref().map(|image| ImageProgress {
+            image: image.image.0,
+            held: image.held,
+            chunks: image.chunks,
+            conflicts: image.conflicts,
+        }),
+        download: status.download.map(|id| id.0),
+    }
+}
+
+fn link_view(status: &LinkStatus) -> LinkView {
+    LinkView {
+        link: status.link.to_string(),
+        satellite: status.satellite.to_string(),
+        state: status.state.name().to_owned(),
+        reason: match &status.state {
+            LinkState::Unavailable { reason } | LinkState::Failed { reason } => Some(reason.clone()),
+            LinkState::Ok | LinkState::Disabled => None,
+        },
+        armed: status.armed,
+        on_air: status.on_air,
+        frames: status.frames,
+        skipped_bytes: status.skipped_bytes,
+        bad: status.bad,
+        radiated: status.radiated,
+        airtime_ms: status.airtime_us / 1000,
+        rssi_dbm: status.rssi_dbm,
+    }
+}
