@@ -150,7 +150,7 @@ pub struct Device {
     outbox: VecDeque<DeviceOutput>,
     /// When the satellite's radiation that was begun last began and ends.
     radiating_us: (u64, u64),
-    /// Time of the last step; nothing happens before it any more.
+    /// Time of the last step or input; nothing happens before it any more.
     now_us: u64,
     /// A moment at which the module claimed an event and had none.
     module_idle_us: Option<u64>,
@@ -194,12 +194,14 @@ impl Device {
     /// The host's port begins to send these bytes.
     pub fn host_write(&mut self, now_us: u64, bytes: &[u8]) {
         self.module_idle_us = None;
+        self.now_us = self.now_us.max(now_us);
         self.module.host_write(now_us, bytes);
     }
 
     /// The host drives the mode pins (levels at the module).
     pub fn set_pins(&mut self, now_us: u64, m0: bool, m1: bool) {
         self.module_idle_us = None;
+        self.now_us = self.now_us.max(now_us);
         self.module.set_pins(now_us, m0, m1);
     }
 
@@ -241,6 +243,7 @@ impl Device {
 
     /// Something goes wrong with the satellite, or right again, now. Poll afterwards.
     pub fn inject(&mut self, now_us: u64, fault: Fault) {
+        self.now_us = self.now_us.max(now_us);
         self.twin.inject(now_us, fault);
         self.drain_journal();
     }
@@ -345,7 +348,14 @@ impl Device {
             Event::DownEnds => self.twin.sent(now_us),
             Event::DownHeard { start_us, bytes, rssi_dbm } => {
                 self.module_idle_us = None;
-                self.module.air_receive(now_us, start_us, &bytes, rssi_dbm);
+                self.module.air_receive_for(
+                    now_us,
+                    start_us,
+                    BROADCAST,
+                    self.channel_number,
+                    &bytes,
+                    rssi_dbm,
+                );
             }
         }
     }

@@ -315,7 +315,7 @@ impl Twin {
             Answer::AdcsInfo => Downlink::AdcsInfo(self.body.adcs_info(&self.reading(now_us))),
             Answer::ScheduleInfo => Downlink::ScheduleInfo(self.schedule_info()),
             Answer::Heartbeat => Downlink::Heartbeat(self.body.heartbeat(&self.reading(now_us))),
-            Answer::Chunk(chunk) => Downlink::ImageChunk(*chunk),
+            Answer::Chunk(chunk) => Downlink::ImageChunk(**chunk),
         }
     }
 

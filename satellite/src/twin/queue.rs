@@ -20,7 +20,7 @@ pub(super) enum Answer {
     AdcsInfo,
     ScheduleInfo,
     Heartbeat,
-    Chunk(ImageChunk),
+    Chunk(Box<ImageChunk>),
 }
 
 /// What waits: one packet, or the chunks of ranges that are known not to be empty.
@@ -95,9 +95,9 @@ impl Queue {
             let found = match &mut waiting.work {
                 Work::One(answer) => Some(answer.clone()),
                 Work::Chunks { ranges } => {
-                    let chunk = next_number(ranges).and_then(|number| image?.chunk(number));
-                    if let Some(chunk) = chunk
-                        && ranges.iter().any(|range| !range.is_empty())
+                    let chunk = next_number(ranges).and_then(|number| image?.chunk(number)).map(Box::new);
+                    if ranges.iter().any(|range| !range.is_empty())
+                        && let Some(chunk) = chunk
                     {
                         return Some((tag, Answer::Chunk(chunk)));
                     }
