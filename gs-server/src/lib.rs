@@ -2,8 +2,16 @@
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | [`run`] | the server as a function; the order of start and end |
+//! | [`engine`] | the actor that owns the station and carries out what it asks |
+//! | [`links`] | serial ports, TCP connections, recordings: each an actor with the radio driver |
+//! | [`storage`], [`witness`] | the archive, the reserve, and the counters' witness beside them |
+//! | [`hub`] | committed events on their way to watchers |
+//! | [`http`] | API v1, the stream, the first page |
 //! | [`clock`] | the machine's clock and simulated ones; the only place that reads time or sets a timer |
 //! | [`config`] | one TOML file, a struct per section |
+//! | [`lifecycle`] | how tasks live and die |
+//! | [`keys`], [`decode`] | key files; captures to JSON |
 //!
 //! What it does **not** do: decide what to send or when (the mission engine does), know the wire format (`protocol`
 //! does) or the module's commands (`radio` does). Tasks and threads are born only here.
@@ -15,5 +23,8 @@ pub mod engine;
 pub mod http;
 pub mod hub;
 pub mod keys;
+pub mod lifecycle;
+pub mod links;
+pub mod run;
 pub mod storage;
 pub mod witness;

@@ -2,25 +2,45 @@
 //!
 //! [`run`] is what `serve` calls; [`run_with`] takes in addition a clock, a store, randomness and wires of the caller's
 //! own, as `demo` and tests do. Neither exits the process, sets a global logger or installs a signal handler.
+//!
+//! Order at start: configuration, keys, archive (lock, check, snapshot, reserve), engine, links, API; then it is ready.
+//! Order at the end, 5 s in all: the API takes nothing new and the engine radiates nothing new, links finish the frame
+//! that is on the air, everything that came in becomes durable, the archive is closed.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::time::Duration;
 
-use mission::{Entropy, LinkId};
+use mission::{Entropy, Intent, LinkId, Principal, StationConfig};
+use protocol::Key;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 
-use crate::clock::{Timer, Wire};
-use crate::config::Config;
-use crate::engine::{EngineHandle, EngineInbox};
+use crate::clock::{ScaledClock, SystemClock, Timer, Wire};
+use crate::config::{Changes, Config, ConfigError, station_config};
+use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, OsEntropy};
+use crate::http::{self, AllowedHosts, HttpState, Identity, Token, TokenError};
 use crate::hub::Hub;
-use crate::storage::Store;
+use crate::keys::{self, KeyError};
+use crate::lifecycle::{Lifecycle, TaskFailure};
+use crate::links::{self, LinkParts};
+use crate::storage::reserve::ReserveError;
+use crate::storage::{Store, StoreError, StoreOptions};
+
+/// What requests under way may take at the end.
+const API_END: Duration = Duration::from_millis(600);
+/// What links may take: a frame on the air is sent to its end.
+const LINKS_END: Duration = Duration::from_millis(2_800);
+/// What the last records may take to become durable.
+const ENGINE_END: Duration = Duration::from_millis(900);
+/// What closing the archive may take.
+const STORE_END: Duration = Duration::from_millis(400);
 
 /// What a caller may bring along. [`RunOptions::new`] brings what `serve` needs.
 pub struct RunOptions {
-    /// The configuration, checked again by [`run_with`].
+    /// The configuration; checked by [`run_with`].
     pub config: Config,
     /// The clock; made from the configuration when `None`.
     pub timer: Option<Arc<dyn Timer>>,
@@ -32,12 +52,29 @@ pub struct RunOptions {
     pub wires: BTreeMap<LinkId, Wire>,
     /// Told once, when the archive is open, the links run and the API listens.
     pub ready: Option<oneshot::Sender<Ready>>,
-    /// Changed configurations (SIGHUP).
+    /// Changed configurations (SIGHUP): what can be applied is, what needs a restart is named in the log.
     pub reload: Option<mpsc::Receiver<Config>>,
-    /// Called with a new log filter when a reload brings one.
+    /// Called with the new log filter when a reload brings one.
     pub set_log_filter: Option<Box<dyn Fn(&str) + Send + Sync>>,
-    /// Facts of a demo for the page and the API; see [`crate::http`].
+    /// Facts of a demo for the page and the API.
     pub demo: Option<serde_json::Value>,
+}
+
+impl RunOptions {
+    /// Everything from the configuration and the machine.
+    pub fn new(config: Config) -> Self {
+        Self {
+            config,
+            timer: None,
+            store: None,
+            entropy: None,
+            wires: BTreeMap::new(),
+            ready: None,
+            reload: None,
+            set_log_filter: None,
+            demo: None,
+        }
+    }
 }
 
 /// A server that is ready.
@@ -60,8 +97,309 @@ pub struct Ready {
 /// How a run ended well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Report {
-    /// Every record that the engine made is durable.
-    pub drained: bool,
     /// Tasks that did not end in time and were left behind.
     pub abandoned_tasks: usize,
+}
+
+/// Why a run did not begin, or ended before it was told to.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A key file.
+    #[error(transparent)]
+    Key(#[from] KeyError),
+    /// A simulated key with real links, or a real key with simulated ones.
+    #[error(
+        "key file {file} is {}, the links are {}: {}",
+        if *.simulated { "simulated" } else { "real" },
+        if *.simulated { "real" } else { "simulated" },
+        if *.simulated { "a real satellite needs a key of its own (gs-server key new)" }
+        else { "a real key never goes to a twin; make one with gs-server key new --simulated" },
+    )]
+    KeyKind {
+        /// The file.
+        file: String,
+        /// What the key is.
+        simulated: bool,
+    },
+    /// A simulated clock with real links, or the other way round.
+    #[error("the clock is simulated and the links are real: real links refuse it")]
+    ClockKind,
+    /// A store that was brought along is simulated and the links are real, or the other way round.
+    #[error("the data folder is {}, the links are not", if *.simulated { "simulated" } else { "real" })]
+    StoreKind {
+        /// What the folder is.
+        simulated: bool,
+    },
+    /// The archive.
+    #[error("the archive cannot be opened")]
+    Store(#[from] StoreError),
+    /// The reserve.
+    #[error("the reserve cannot be read")]
+    Reserve(#[from] ReserveError),
+    /// The token file.
+    #[error(transparent)]
+    Token(#[from] TokenError),
+    /// The listener or the machine.
+    #[error("{what}")]
+    Io {
+        /// What was tried.
+        what: &'static str,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// A task died.
+    #[error(transparent)]
+    Task(#[from] TaskFailure),
+}
+
+/// Runs a server until `stop`.
+///
+/// # Errors
+/// [`RunError`] when it cannot begin, or when a part of it died.
+pub async fn run(config: Config, listener: TcpListener, stop: CancellationToken) -> Result<Report, RunError> {
+    run_with(RunOptions::new(config), listener, stop).await
+}
+
+/// [`run`], with what the caller brings along.
+///
+/// # Errors
+/// As [`run`].
+pub async fn run_with(
+    options: RunOptions,
+    listener: TcpListener,
+    stop: CancellationToken,
+) -> Result<Report, RunError> {
+    let RunOptions { config, timer, store, entropy, mut wires, ready, reload, set_log_filter, demo } = options;
+    config.check()?;
+    no_core_dumps();
+    tracing::info!("configuration:\n{config}");
+    let keys = load_keys(&config)?;
+    let station = station_config(&config, &keys)?;
+    drop(keys);
+    let timer = clock_for(&config, timer)?;
+    // A stepped clock stands still until all actors run.
+    let starting = timer.busy("start of the server");
+    let token = |folder_is_there: &Store| {
+        let _ = folder_is_there;
+        Token::load_or_create(&config.token_file())
+    };
+    let store = open_store(&config, store).await?;
+    let address = listener.local_addr().map_err(|source| RunError::Io { what: "the listener has no address", source })?;
+    let token = token(&store)?;
+    let snapshot = store.snapshot(&satellites_of(&station), &keys_of(&station)).await?;
+    let recovered = store.reserve_read().await?;
+    if !recovered.is_empty() {
+        tracing::warn!(frames = recovered.len(), "{} raw frames come back from the reserve", recovered.len());
+    }
+    let entropy = match entropy {
+        Some(entropy) => entropy,
+        None => Box::new(OsEntropy::new().map_err(|source| RunError::Io { what: "no randomness", source })?),
+    };
+    let hub = Hub::new();
+    let (ports, commands): (Vec<_>, Vec<_>) =
+        station.links.iter().map(|link| LinkPort::new(link.id.clone())).unzip();
+    let identity = Identity::of(&station, config.is_simulated());
+    let ids: Vec<LinkId> = station.links.iter().map(|link| link.id.clone()).collect();
+    let (engine, inbox, handle) = Engine::new(EngineParts {
+        station,
+        snapshot,
+        recovered,
+        store: store.clone(),
+        timer: Arc::clone(&timer),
+        clock: config.station.clock,
+        entropy,
+        hub: hub.clone(),
+        links: ports,
+    });
+
+    let api = Lifecycle::new(&stop);
+    // The engine and the links are told to stop with the API, and to end after it.
+    let works = Lifecycle::new(&CancellationToken::new());
+    let radios = Lifecycle::new(&api.soft);
+    let (quiet, finish) = (api.soft.clone(), works.soft.clone());
+    works.spawn("engine", async move { engine.run(quiet, finish).await.map_err(Into::into) });
+    for ((id, section), commands) in ids.into_iter().zip(&config.links).zip(commands) {
+        let wire = wires.remove(&id);
+        let (engine, timer, stop) = (inbox.clone(), Arc::clone(&timer), radios.soft.clone());
+        let parts = LinkParts { section: section.clone(), engine, commands, timer, wire, id };
+        radios.spawn(format!("link {}", section.name), async move {
+            links::run(parts, stop).await;
+            Ok(())
+        });
+    }
+    let state = HttpState {
+        store: store.clone(),
+        engine: handle.clone(),
+        hub: hub.clone(),
+        timer: Arc::clone(&timer),
+        token,
+        identity,
+        demo,
+        stop: api.soft.clone(),
+    };
+    let router = http::router(state, AllowedHosts::new(address, &config.http.allowed_hosts));
+    let serving = api.soft.clone();
+    api.spawn("API", async move { http::serve(listener, router, serving).await.map_err(Into::into) });
+    if let Some(reload) = reload {
+        let (engine, soft) = (handle.clone(), api.soft.clone());
+        api.spawn("reload", async move {
+            reloads(config, reload, engine, set_log_filter, soft).await;
+            Ok(())
+        });
+    }
+    tracing::info!(%address, "ready: the API and the page are at http://{address}/");
+    if let Some(ready) = ready {
+        let is = Ready {
+            address,
+            engine: handle.clone(),
+            inbox: inbox.clone(),
+            hub,
+            store: store.clone(),
+            timer: Arc::clone(&timer),
+        };
+        // Nobody has to wait for it.
+        let _ = ready.send(is);
+    }
+    drop(starting);
+
+    tokio::select! {
+        () = api.soft.cancelled() => {}
+        () = radios.soft.cancelled() => {}
+        () = works.soft.cancelled() => {}
+    }
+    tracing::info!("stopping");
+    api.soft.cancel();
+    let (api_left, radios_left) = tokio::join!(api.finish(API_END), radios.finish(LINKS_END));
+    works.soft.cancel();
+    let abandoned_tasks = api_left + radios_left + works.finish(ENGINE_END).await;
+    match crate::clock::within(STORE_END, store.close()).await {
+        Some(Ok(())) => {}
+        Some(Err(error)) => tracing::warn!(%error, "the archive was not closed in order: {error}"),
+        None => tracing::warn!("the archive was not closed in time; what was told is durable all the same"),
+    }
+    for life in [&works, &radios, &api] {
+        if let Some(failure) = life.failure() {
+            return Err(failure.into());
+        }
+    }
+    tracing::info!("stopped");
+    Ok(Report { abandoned_tasks })
+}
+
+/// Keys are in memory: no crash may write them to a disk.
+fn no_core_dumps() {
+    use rustix::process::{Resource, Rlimit, setrlimit};
+    let none = Rlimit { current: Some(0), maximum: Some(0) };
+    if let Err(error) = setrlimit(Resource::Core, none) {
+        tracing::warn!(%error, "core dumps cannot be switched off: {error}");
+    }
+}
+
+/// The key of each satellite that has one. Simulated keys go with simulated links only, real ones with real links.
+fn load_keys(config: &Config) -> Result<BTreeMap<String, Key>, RunError> {
+    let mut loaded = BTreeMap::new();
+    for satellite in &config.satellites {
+        let Some(path) = &satellite.key_file else { continue };
+        let file = keys::load(path)?;
+        if file.simulated != config.is_simulated() {
+            return Err(RunError::KeyKind { file: path.display().to_string(), simulated: file.simulated });
+        }
+        loaded.insert(satellite.name.clone(), file.key);
+    }
+    Ok(loaded)
+}
+
+fn clock_for(config: &Config, brought: Option<Arc<dyn Timer>>) -> Result<Arc<dyn Timer>, RunError> {
+    let timer = brought.unwrap_or_else(|| match config.simulation {
+        Some(simulation) => Arc::new(ScaledClock::new(simulation.speed)),
+        None => Arc::new(SystemClock::new()),
+    });
+    if timer.is_simulated() && !config.is_simulated() {
+        return Err(RunError::ClockKind);
+    }
+    Ok(timer)
+}
+
+async fn open_store(config: &Config, brought: Option<Store>) -> Result<Store, RunError> {
+    let simulated = config.is_simulated();
+    let store = match brought {
+        Some(store) => store,
+        None => {
+            Store::open(StoreOptions {
+                folder: config.storage.folder.clone(),
+                simulated,
+                max_page_count: config.storage.max_page_count,
+                reserve_bytes: config.storage.reserve_bytes,
+            })
+            .await?
+        }
+    };
+    if store.is_simulated() == simulated {
+        Ok(store)
+    } else {
+        Err(RunError::StoreKind { simulated: store.is_simulated() })
+    }
+}
+
+fn satellites_of(station: &StationConfig) -> Vec<mission::SatelliteId> {
+    station.satellites.iter().map(|satellite| satellite.id.clone()).collect()
+}
+
+fn keys_of(station: &StationConfig) -> Vec<protocol::KeyId> {
+    station.satellites.iter().filter_map(|satellite| satellite.key.as_ref().map(Key::id)).collect()
+}
+
+/// Applies what can be applied of changed configurations, and names what needs a restart.
+async fn reloads(
+    mut config: Config,
+    mut reload: mpsc::Receiver<Config>,
+    engine: EngineHandle,
+    set_log_filter: Option<Box<dyn Fn(&str) + Send + Sync>>,
+    stop: CancellationToken,
+) {
+    let mut number = 0_u64;
+    loop {
+        let new = tokio::select! {
+            () = stop.cancelled() => return,
+            new = reload.recv() => match new {
+                Some(new) => new,
+                None => return stop.cancelled().await,
+            },
+        };
+        if let Err(error) = new.check() {
+            tracing::error!(%error, "the changed configuration is refused, the old one stays in force: {error}");
+            continue;
+        }
+        let changes = Changes::between(&config, &new);
+        if changes.is_empty() {
+            tracing::info!("reload: nothing has changed");
+        }
+        if let (Some(filter), Some(set)) = (&changes.log_filter, &set_log_filter) {
+            set(filter);
+            tracing::info!(%filter, "reload: log filter is '{filter}' now");
+        }
+        for (name, armed) in &changes.armed {
+            number += 1;
+            let Ok(link) = LinkId::new(name) else { continue };
+            let key = format!("reload-{}-{number}", uuid::Uuid::new_v4());
+            let intent = Intent::ArmLink { link, armed: *armed };
+            match engine.intent(Principal::new("configuration"), key, [0; 32], intent).await {
+                Ok(_) => tracing::info!(link = %name, armed, "reload: link {name} is {}", if *armed { "armed" } else { "not armed any more" }),
+                Err(error) => tracing::error!(link = %name, "reload: link {name} cannot be armed or disarmed: {error}"),
+            }
+        }
+        for key in &changes.need_restart {
+            tracing::warn!(%key, "reload: {key} has changed and needs a restart; the old value stays in force");
+        }
+        // What was applied is in force; the rest is named again at the next reload.
+        for (name, armed) in changes.armed {
+            if let Some(link) = config.links.iter_mut().find(|link| link.name == name) {
+                link.armed = armed;
+            }
+        }
+        config.log.filter = new.log.filter;
+    }
 }

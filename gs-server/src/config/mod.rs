@@ -108,18 +108,13 @@ impl Config {
     }
 
     fn anchor_paths(&mut self, base: &Path) {
-        let anchor = |path: &mut PathBuf| {
+        let keys = self.satellites.iter_mut().filter_map(|satellite| satellite.key_file.as_mut());
+        let files = self.links.iter_mut().filter_map(|link| link.file.as_mut());
+        let others = [&mut self.storage.folder].into_iter().chain(self.http.token_file.as_mut());
+        for path in keys.chain(files).chain(others) {
             if path.is_relative() {
                 *path = base.join(&*path);
             }
-        };
-        anchor(&mut self.storage.folder);
-        self.http.token_file.as_mut().map_or((), anchor);
-        for satellite in &mut self.satellites {
-            satellite.key_file.as_mut().map_or((), anchor);
-        }
-        for link in &mut self.links {
-            link.file.as_mut().map_or((), anchor);
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! links ──┐                       ┌─▶ storage (one batch at a time) ─▶ hub
-//! HTTP  ──┼─▶ inbox ─▶ Station ─▶ ┼─▶ witness (file)
+//! HTTP  ──┼─▶ inbox ─▶ Station ─▶ ┼─▶ witness and reserve (files)
 //! clock ──┘                       ├─▶ links (transmit)
 //!                                 └─▶ whoever asked
 //! ```
@@ -13,10 +13,15 @@
 //! It does **not** decide anything: not what is sent, not when, not what an event is.
 
 mod actor;
+mod background;
+mod entropy;
 mod handle;
+mod intents;
 mod message;
+mod watch;
 
-pub use actor::{EngineParts, OsEntropy, SeededEntropy};
+pub use actor::{EngineError, EngineParts};
+pub use entropy::{OsEntropy, SeededEntropy};
 pub use handle::{Done, EngineHandle, IntentError};
 pub use message::{EngineInbox, EngineMessage, LinkCommand, LinkPort};
 

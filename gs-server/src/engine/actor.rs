@@ -1,0 +1,292 @@
+//! The loop around the station.
+
+use std::sync::Arc;
+
+use mission::port::ReservedFrame;
+use mission::{Effect, Entropy, Input, MaybeRadiated, MonoUs, Now, Snapshot, Station, StationConfig, TxId};
+use tokio::sync::mpsc;
+use tokio_util::sync::CancellationToken;
+
+use super::background::{Background, Outcome, ReserveWork};
+use super::handle::{EngineHandle, INTENTS, Request};
+use super::intents::Intents;
+use super::message::{EngineInbox, EngineMessage, INBOX, LinkCommand, LinkPort};
+use super::watch::StatusView;
+use crate::clock::{BusyToken, Timer, kernel_says_synchronised};
+use crate::config::ClockSetting;
+use crate::hub::Hub;
+use crate::storage::Store;
+
+/// How often the kernel is asked about its clock.
+const CLOCK_CHECK_US: u64 = 30_000_000;
+
+/// What the engine is made of.
+pub struct EngineParts {
+    /// The station, its satellites and links.
+    pub station: StationConfig,
+    /// What was stored; see [`Store::snapshot`].
+    pub snapshot: Snapshot,
+    /// What the reserve kept; see [`Store::reserve_read`].
+    pub recovered: Vec<ReservedFrame>,
+    /// Where records go.
+    pub store: Store,
+    /// The clock.
+    pub timer: Arc<dyn Timer>,
+    /// Who says that it is right.
+    pub clock: ClockSetting,
+    /// Randomness for nonces and padding.
+    pub entropy: Box<dyn Entropy>,
+    /// Where committed events go.
+    pub hub: Hub,
+    /// The links' inboxes.
+    pub links: Vec<LinkPort>,
+}
+
+/// Why the engine ended before it was told to.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    /// A task of storage ended without an answer.
+    #[error("storage died in the middle of its work")]
+    Storage(#[source] tokio::task::JoinError),
+}
+
+/// The actor.
+pub(crate) struct Engine {
+    station: Station,
+    store: Store,
+    timer: Arc<dyn Timer>,
+    next_clock_check: Option<MonoUs>,
+    hub: Hub,
+    links: Vec<LinkPort>,
+    inbox: mpsc::Receiver<(EngineMessage, BusyToken)>,
+    requests: mpsc::Receiver<Request>,
+    intents: Intents,
+    status: StatusView,
+    background: Background,
+}
+
+impl Engine {
+    /// The actor, the way in for links, and the handle for operators.
+    pub(crate) fn new(parts: EngineParts) -> (Self, EngineInbox, EngineHandle) {
+        let EngineParts { station, snapshot, recovered, store, timer, clock, entropy, hub, links } = parts;
+        let now = timer.now();
+        let mut station = Station::new(station, snapshot, entropy, now);
+        for frame in &recovered {
+            station.handle(now, Input::Recovered(frame));
+        }
+        let vouched = timer.is_simulated() || clock == ClockSetting::Trust;
+        station.handle(now, Input::Clock { synchronised: vouched });
+        let (status, shown) = StatusView::new(&station, now);
+        let (sender, inbox) = mpsc::channel(INBOX);
+        let (requests_in, requests) = mpsc::channel(INTENTS);
+        let engine = Self {
+            station,
+            store,
+            next_clock_check: (!vouched && clock == ClockSetting::Kernel).then_some(now.mono),
+            hub,
+            links,
+            inbox,
+            requests,
+            intents: Intents::default(),
+            status,
+            background: Background::default(),
+            timer: Arc::clone(&timer),
+        };
+        let inbox = EngineInbox { sender, timer: Arc::clone(&timer) };
+        (engine, inbox, EngineHandle { requests: requests_in, status: shown, timer })
+    }
+
+    /// Works until `finish` and everything is durable. After `stop` nothing new is radiated and no intent is taken.
+    ///
+    /// # Errors
+    /// [`EngineError`] when a part of it died.
+    pub(crate) async fn run(
+        mut self,
+        stop: CancellationToken,
+        finish: CancellationToken,
+    ) -> Result<(), EngineError> {
+        let mut awake = self.timer.busy("engine");
+        let mut stopped = false;
+        loop {
+            let now = self.timer.now();
+            self.carry_out(now);
+            let finishing = finish.is_cancelled();
+            self.status.look(&self.station, now, finishing);
+            if finishing && self.is_drained() {
+                return Ok(());
+            }
+            let due = [
+                self.station.next_wakeup(),
+                self.status.due(self.station.is_settled()),
+                self.next_clock_check,
+            ];
+            let sleep = due.into_iter().flatten().min().map(|at| self.timer.sleep_until(at));
+            drop(awake);
+            awake = tokio::select! {
+                biased;
+                done = self.background.next() => {
+                    let (outcome, busy) = done.map_err(EngineError::Storage)?;
+                    self.take_outcome(outcome);
+                    busy
+                }
+                Some((message, busy)) = self.inbox.recv() => {
+                    self.take_message(message);
+                    busy
+                }
+                Some(request) = self.requests.recv(), if !stopped => {
+                    let busy = request.busy.clone();
+                    self.take_request(request);
+                    busy
+                }
+                busy = async { match sleep { Some(sleep) => sleep.await, None => std::future::pending().await } } => {
+                    self.take_time();
+                    busy
+                }
+                () = stop.cancelled(), if !stopped => {
+                    stopped = true;
+                    // Whoever waits in the queue sees its answer dropped: that means stopping.
+                    self.requests.close();
+                    while self.requests.try_recv().is_ok() {}
+                    self.handle(Input::Stop);
+                    self.timer.busy("engine")
+                }
+                () = finish.cancelled(), if !finishing => self.timer.busy("engine"),
+            };
+        }
+    }
+
+    fn is_drained(&self) -> bool {
+        self.inbox.is_empty()
+            && self.background.is_idle()
+            && (self.station.is_settled() || self.station.status(self.timer.now()).storage.failing.is_some())
+    }
+
+    fn handle(&mut self, input: Input<'_>) {
+        self.station.handle(self.timer.now(), input);
+        self.status.note();
+    }
+
+    fn take_message(&mut self, message: EngineMessage) {
+        match message {
+            EngineMessage::Bytes { link, bytes, source, received } => {
+                self.handle(Input::Bytes { link: &link, bytes: &bytes, source, received });
+            }
+            EngineMessage::Link { link, state } => self.handle(Input::Link { link: &link, state }),
+            EngineMessage::TxStarted(tx) => self.handle(Input::TxStarted(tx)),
+            EngineMessage::TxDone { tx, airtime_us, measured } => {
+                self.handle(Input::TxDone { tx, airtime_us, measured });
+            }
+            EngineMessage::TxFailed { tx, radiated, reason } => {
+                self.handle(Input::TxFailed { tx, radiated, reason: &reason });
+            }
+            EngineMessage::View { satellite, in_view } => {
+                self.handle(Input::View { satellite: &satellite, in_view });
+            }
+        }
+    }
+
+    fn take_request(&mut self, request: Request) {
+        if let Some((intent, principal, key)) = self.intents.take(request) {
+            let store = self.store.clone();
+            self.background.start(self.timer.busy("looking an intent up"), async move {
+                Outcome::LookedUp { intent, result: store.find_intent(&principal, &key).await }
+            });
+        }
+    }
+
+    fn take_outcome(&mut self, outcome: Outcome) {
+        match outcome {
+            Outcome::Persisted { batch, result: Ok(events) } => {
+                for event in events {
+                    self.hub.publish(event);
+                }
+                self.handle(Input::PersistDone(batch));
+            }
+            Outcome::Persisted { batch, result: Err(error) } => {
+                let reason = whole(&error);
+                tracing::error!(batch = batch.0, "storage takes nothing: {reason}");
+                self.handle(Input::PersistFailed { batch, reason: &reason });
+            }
+            Outcome::Witness { key, counter, result: Ok(()) } => self.handle(Input::WitnessDone { key, counter }),
+            Outcome::Witness { key, result: Err(error), .. } => {
+                let reason = whole(&error);
+                tracing::error!(%key, "the witness of key {key} cannot be raised: {reason}");
+                self.handle(Input::WitnessFailed { key, reason: &reason });
+            }
+            Outcome::LookedUp { intent, result } => {
+                let found = result.map_err(|error| tracing::error!("an intent cannot be looked up: {}", whole(&error)));
+                if let Some(envelope) = self.intents.looked_up(intent, found) {
+                    self.handle(Input::Intent(envelope));
+                }
+            }
+            Outcome::Reserve => {}
+            Outcome::Clock { synchronised } => self.handle(Input::Clock { synchronised }),
+        }
+    }
+
+    fn take_time(&mut self) {
+        let now = self.timer.now().mono;
+        if self.next_clock_check.is_some_and(|at| at <= now) {
+            self.next_clock_check = Some(now.plus(CLOCK_CHECK_US));
+            self.background.start(self.timer.busy("asking the kernel for its clock"), async {
+                Outcome::Clock { synchronised: kernel_says_synchronised().await }
+            });
+        }
+        if self.station.next_wakeup().is_some_and(|at| at <= now) {
+            self.handle(Input::Wake);
+        }
+    }
+
+    fn carry_out(&mut self, now: Now) {
+        while let Some(effect) = self.station.next_effect() {
+            match effect {
+                Effect::Persist(batch) => {
+                    let store = self.store.clone();
+                    self.background.start(self.timer.busy("storing a batch"), async move {
+                        Outcome::Persisted { batch: batch.id, result: store.apply(&batch).await }
+                    });
+                }
+                Effect::Witness { key, counter } => {
+                    let store = self.store.clone();
+                    self.background.start(self.timer.busy("raising the witness"), async move {
+                        Outcome::Witness { key, counter, result: store.raise_witness(key, counter).await }
+                    });
+                }
+                Effect::Transmit(transmit) => {
+                    let tx = transmit.tx;
+                    let busy = self.timer.busy("frame on its way to the link");
+                    let sent = match self.links.iter().find(|port| port.link == transmit.link) {
+                        Some(port) => port.sender.try_send((LinkCommand::Transmit(transmit), busy)).is_ok(),
+                        None => false,
+                    };
+                    if !sent {
+                        self.transmit_failed(now, tx);
+                    }
+                }
+                Effect::Reply { intent, result } => self.intents.reply(intent, result),
+                Effect::Reserve(frame) => self.background.queue_reserve(ReserveWork::Push(Box::new(frame))),
+                Effect::ReserveClear => self.background.queue_reserve(ReserveWork::Clear),
+            }
+        }
+        let timer = Arc::clone(&self.timer);
+        self.background.reserve_step(&self.store, || timer.busy("reserve"));
+    }
+
+    fn transmit_failed(&mut self, now: Now, tx: TxId) {
+        let reason = "the link has ended";
+        self.station.handle(now, Input::TxFailed { tx, radiated: MaybeRadiated::No, reason });
+        self.status.note();
+    }
+}
+
+/// An error with all its causes, as one line.
+fn whole(error: &dyn std::error::Error) -> String {
+    let mut line = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        line.push_str(": ");
+        line.push_str(&cause.to_string());
+        source = cause.source();
+    }
+    line
+}
