@@ -25,7 +25,7 @@ pub const BODIES: [(&str, Body); 6] = [
 ];
 
 /// Feeds a stream in pieces whose lengths a few input bytes choose.
-fn pieces<'a>(choice: u8, stream: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+fn pieces(choice: u8, stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     let most = match choice % 4 {
         0 => 1,
         1 => 17,
