@@ -1,24 +1,4 @@
 //! Downlink frames out of a byte stream: ground's side.
-//!
-//! # Rules
-//! - Every magic opens a *candidate*; all open candidates are followed in parallel, none hides another.
-//! - A candidate is decided first when 16 + length bytes are in (the short form), else at 240 (the full form). The CRC
-//!   alone decides. The frame is handed out in the very call that brings its last byte.
-//! - A frame that lies inside an open candidate is handed out at once as well, with `nested: true`: it may be part of an
-//!   image, so it must not change any state yet. When every candidate around it turns out not to be a frame, the same
-//!   frame is handed out again as [`DownItem::Promoted`] and now counts. If one of them is accepted, the flag stands
-//!   and nothing more is said.
-//! - A candidate is *around* a frame as long as it could still become a frame that follows the ICD: before its short
-//!   form is decided; after that while every byte behind its payload is zero, as padding is, or if its header makes no
-//!   sense and the bytes may mean anything; and never once a valid frame overlaps its beginning or another magic stands
-//!   in place of its CRC and header. So the frame after a damaged or cut one is nested only if it lies wholly within
-//!   what the damaged one's header claims as its payload, and then for at most the bytes missing to that candidate's
-//!   240. [`DownDecoder::silence`] ends even that when the caller knows the line has gone quiet. The price: around a
-//!   valid 240-byte frame that breaks the ICD by padding with other bytes than zero, frames inside count; all are
-//!   emitted.
-//! - RSSI: with `rssi`, the byte directly after an accepted frame that counts is its RSSI unless it is `P`.
-//!
-//! Memory is bounded by construction: magics do not overlap, so fewer than 30 candidates are open at a time.
 
 use super::{
     magic,
@@ -81,7 +61,27 @@ pub struct DecoderCounters {
     pub skipped_bytes: u64,
 }
 
-/// Finds downlink frames in bytes that come in any pieces. See the rules at the head of this file.
+/// Finds downlink frames in bytes that come in any pieces.
+///
+/// # Rules
+/// - Every magic opens a *candidate*; all open candidates are followed in parallel, none hides another.
+/// - A candidate is decided first when 16 + length bytes are in (the short form), else at 240 (the full form). The CRC
+///   alone decides. The frame is handed out in the very call that brings its last byte.
+/// - A frame that lies inside an open candidate is handed out at once as well, with `nested: true`: it may be part of an
+///   image, so it must not change any state yet. When every candidate around it turns out not to be a frame, the same
+///   frame is handed out again as [`DownItem::Promoted`] and now counts. If one of them is accepted, the flag stands
+///   and nothing more is said.
+/// - A candidate is *around* a frame as long as it could still become a frame that follows the ICD: before its short
+///   form is decided; after that while every byte behind its payload is zero, as padding is, or if its header makes no
+///   sense and the bytes may mean anything; and never once a valid frame overlaps its beginning or another magic stands
+///   in place of its CRC and header. So the frame after a damaged or cut one is nested only if it lies wholly within
+///   what the damaged one's header claims as its payload, and then for at most the bytes missing to that candidate's
+///   240. [`DownDecoder::silence`] ends even that when the caller knows the line has gone quiet. The price: around a
+///   valid 240-byte frame that breaks the ICD by padding with other bytes than zero, frames inside count; all are
+///   emitted.
+/// - RSSI: with `rssi`, the byte directly after an accepted frame that counts is its RSSI unless it is `P`.
+///
+/// Memory is bounded by construction: magics do not overlap, so fewer than 30 candidates are open at a time.
 #[derive(Clone, Debug)]
 pub struct DownDecoder {
     window: Window,
@@ -183,7 +183,7 @@ impl Candidate {
         }
     }
 
-    /// Whether a frame inside may be part of it, see the rules.
+    /// Whether a frame inside may be part of it, see [`DownDecoder`].
     const fn is_around(&self) -> bool {
         match self.stage {
             _ if self.is_refuted => false,
