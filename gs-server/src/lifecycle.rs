@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use futures_util::FutureExt as _;
+use futures_util::future::BoxFuture;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -83,14 +84,20 @@ impl Lifecycle {
     /// Waits for all tasks, `limit` of wall time at most; the rest is abandoned. The number of those.
     pub async fn finish(&self, limit: Duration) -> usize {
         self.tracker.close();
-        if within(limit, self.tracker.wait()).await.is_some() {
+        if within(limit, self.all_ended()).await.is_some() {
             return 0;
         }
         let left = self.tracker.len();
         self.hard.cancel();
         // Abandoned tasks let go of what they hold at their next await.
-        let _ = within(Duration::from_millis(200), self.tracker.wait()).await;
+        let _ = within(Duration::from_millis(200), self.all_ended()).await;
         left
+    }
+
+    /// Owns what it waits for: a future that borrows the tracker is not `Send` enough for whoever spawns a run.
+    fn all_ended(&self) -> BoxFuture<'static, ()> {
+        let tracker = self.tracker.clone();
+        async move { tracker.wait().await }.boxed()
     }
 
     /// The first task that died.

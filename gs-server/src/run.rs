@@ -12,7 +12,9 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use mission::{Entropy, Intent, LinkId, Principal, StationConfig};
+use futures_util::FutureExt as _;
+use futures_util::future::BoxFuture;
+use mission::{Entropy, Intent, LinkId, Principal, Snapshot, StationConfig};
 use protocol::Key;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
@@ -182,14 +184,11 @@ pub async fn run_with(
     let timer = clock_for(&config, timer)?;
     // A stepped clock stands still until all actors run.
     let starting = timer.busy("start of the server");
-    let token = |folder_is_there: &Store| {
-        let _ = folder_is_there;
-        Token::load_or_create(&config.token_file())
-    };
     let store = open_store(&config, store).await?;
     let address = listener.local_addr().map_err(|source| RunError::Io { what: "the listener has no address", source })?;
-    let token = token(&store)?;
-    let snapshot = store.snapshot(&satellites_of(&station), &keys_of(&station)).await?;
+    // After the archive: the token file may lie in its folder, which is made with it.
+    let token = Token::load_or_create(&config.token_file())?;
+    let snapshot = snapshot(&store, &station).await?;
     let recovered = store.reserve_read().await?;
     if !recovered.is_empty() {
         tracing::warn!(frames = recovered.len(), "{} raw frames come back from the reserve", recovered.len());
@@ -275,7 +274,7 @@ pub async fn run_with(
     let (api_left, radios_left) = tokio::join!(api.finish(API_END), radios.finish(LINKS_END));
     works.soft.cancel();
     let abandoned_tasks = api_left + radios_left + works.finish(ENGINE_END).await;
-    match crate::clock::within(STORE_END, store.close()).await {
+    match crate::clock::within(STORE_END, async move { store.close().await }.boxed()).await {
         Some(Ok(())) => {}
         Some(Err(error)) => tracing::warn!(%error, "the archive was not closed in order: {error}"),
         None => tracing::warn!("the archive was not closed in time; what was told is durable all the same"),
@@ -328,13 +327,19 @@ async fn open_store(config: &Config, brought: Option<Store>) -> Result<Store, Ru
     let store = match brought {
         Some(store) => store,
         None => {
-            Store::open(StoreOptions {
+            let options = StoreOptions {
                 folder: config.storage.folder.clone(),
                 simulated,
                 max_page_count: config.storage.max_page_count,
                 reserve_bytes: config.storage.reserve_bytes,
-            })
-            .await?
+            };
+            // On a thread that may wait: migrations and the check of a large archive take their time.
+            let runtime = tokio::runtime::Handle::current();
+            let opened = tokio::task::spawn_blocking(move || runtime.block_on(Store::open(options))).await;
+            opened.map_err(|source| RunError::Io {
+                what: "the archive cannot be opened: the thread that did it died",
+                source: std::io::Error::other(source),
+            })??
         }
     };
     if store.is_simulated() == simulated {
@@ -344,12 +349,12 @@ async fn open_store(config: &Config, brought: Option<Store>) -> Result<Store, Ru
     }
 }
 
-fn satellites_of(station: &StationConfig) -> Vec<mission::SatelliteId> {
-    station.satellites.iter().map(|satellite| satellite.id.clone()).collect()
-}
-
-fn keys_of(station: &StationConfig) -> Vec<protocol::KeyId> {
-    station.satellites.iter().filter_map(|satellite| satellite.key.as_ref().map(Key::id)).collect()
+/// Owns what it reads with: a future that borrows it is not `Send` enough for whoever spawns a run.
+fn snapshot(store: &Store, station: &StationConfig) -> BoxFuture<'static, Result<Snapshot, StoreError>> {
+    let store = store.clone();
+    let satellites: Vec<_> = station.satellites.iter().map(|satellite| satellite.id.clone()).collect();
+    let keys: Vec<_> = station.satellites.iter().filter_map(|satellite| satellite.key.as_ref().map(Key::id)).collect();
+    async move { store.snapshot(&satellites, &keys).await }.boxed()
 }
 
 /// Applies what can be applied of changed configurations, and names what needs a restart.
