@@ -37,7 +37,9 @@ begin
     select raise(abort, 'a raw frame is never deleted');
 end;
 
-create trigger frames_are_never_changed before update on frames
+-- Only `nested` may change: what lay inside a candidate that turned out to be no frame counts after all.
+create trigger frames_are_never_changed
+before update of id, satellite, station, link, bytes, form, packet_type, tag, heard_at_us on frames
 begin
     select raise(abort, 'a raw frame is never changed');
 end;

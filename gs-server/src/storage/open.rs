@@ -97,6 +97,7 @@ fn prepare(folder: &Path) -> Result<(FolderLock, u64), StoreError> {
     let lock = FolderLock::take(folder)?;
     let path = folder.join(DATABASE);
     let failed = |error| StoreError::from_io(&path, error);
+    let is_new = !path.exists();
     // SQLite gives the write-ahead log the mode of this file.
     let file = OpenOptions::new()
         .read(true)
@@ -107,10 +108,10 @@ fn prepare(folder: &Path) -> Result<(FolderLock, u64), StoreError> {
         .open(&path)
         .map_err(failed)?;
     let size_bytes = file.metadata().map_err(failed)?.len();
-    if size_bytes == 0 {
-        if folder.join("witness").is_dir() {
-            return Err(StoreError::damaged("the file is empty, though there was a database here"));
-        }
+    if size_bytes == 0 && !is_new && folder.join("witness").is_dir() {
+        return Err(StoreError::damaged("the file is empty, though there was a database here"));
+    }
+    if is_new {
         File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed)?;
     }
     Ok((lock, size_bytes))
@@ -146,7 +147,6 @@ fn reader_options(options: &StoreOptions) -> SqliteConnectOptions {
         .busy_timeout(Duration::from_secs(5))
         // Not `read_only`: a reader of a write-ahead log must be able to write its index.
         .pragma("query_only", "on")
-        .pragma("mmap_size", "268435456")
         .thread_name(|number| format!("store-reader-{number}"))
 }
 

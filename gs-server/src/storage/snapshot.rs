@@ -161,11 +161,18 @@ async fn command(connection: &mut SqliteConnection, row: &CommandRow) -> Result<
         ),
         None => (Stage::Queued, UtcUs(row.created_at_us), 0),
     };
+    let on_air_us: Option<i64> = sqlx::query_scalar(
+        "select max(at_us) from command_stages where command = ? and stage in ('radiating', 'radiated')",
+    )
+    .bind(row.id)
+    .fetch_one(&mut *connection)
+    .await?;
     Ok(CommandSnapshot {
         record: row.record()?,
         stage,
         stage_at,
         attempt,
+        on_air_at: on_air_us.map(UtcUs),
         sealed: sealed.as_ref().map(sealed_snapshot).transpose()?,
     })
 }

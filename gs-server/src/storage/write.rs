@@ -181,7 +181,7 @@ impl Transaction<'_> {
 
     async fn write(&mut self, record: &Record) -> Result<Option<StoredEvent>, StoreError> {
         match record {
-            Record::Frame(frame) => self.insert(&FrameRow::of(frame)?).await?,
+            Record::Frame(frame) => self.frame(&FrameRow::of(frame)?).await?,
             Record::Reception(reception) => self.insert(&ReceptionRow::of(reception)?).await?,
             Record::ReceptionRssi(rssi) => self.set_rssi(rssi).await?,
             Record::Telemetry(telemetry) => self.telemetry(telemetry).await?,
@@ -207,6 +207,31 @@ impl Transaction<'_> {
 
     async fn upsert<R: Row>(&mut self, key: &'static str, row: &R) -> Result<(), StoreError> {
         row.bind(sqlx::query(upsert::<R>(key))).execute(&mut *self.connection).await?;
+        Ok(())
+    }
+
+    /// A new frame; or one that is there, of which `nested` alone may change.
+    async fn frame(&mut self, row: &FrameRow) -> Result<(), StoreError> {
+        let insert = AssertSqlSafe(format!("{} on conflict (id) do nothing", FrameRow::INSERT));
+        let inserted = row.bind(sqlx::query(insert)).execute(&mut *self.connection).await?;
+        if inserted.rows_affected() > 0 {
+            return Ok(());
+        }
+        let found = sqlx::query(select::<FrameRow>("where id = ?"))
+            .bind(row.id)
+            .fetch_one(&mut *self.connection)
+            .await?;
+        let found = FrameRow::read(&found)?;
+        if found.bytes != row.bytes {
+            return Err(StoreError::Conflict(format!("frame {} is there already, with other bytes", row.id)));
+        }
+        let found = FrameRow { nested: row.nested, ..found };
+        sqlx::query("update frames set nested = ?, crc = ? where id = ?")
+            .bind(found.nested)
+            .bind(found.crc())
+            .bind(found.id)
+            .execute(&mut *self.connection)
+            .await?;
         Ok(())
     }
 
