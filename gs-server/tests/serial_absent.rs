@@ -1,11 +1,13 @@
 //! What a missing port costs: alone in its process, so that the figure is the server's.
 
-mod run_support;
+#[expect(dead_code, reason = "shared with the tests in run")]
+#[path = "run/support.rs"]
+mod support;
 
 use std::time::Duration;
 
 use gs_server::run::RunOptions;
-use run_support::{Folder, Server, pause, wall};
+use support::{Folder, Server, pause, wall};
 
 /// CPU time of this process: user and system, in clock ticks of 10 ms.
 fn cpu() -> Duration {

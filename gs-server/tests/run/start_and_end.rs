@@ -1,14 +1,12 @@
 //! Start, end, and who is refused.
 
-mod run_support;
-
 use std::time::Duration;
 
 use gs_server::config::Config;
 use gs_server::run::{RunError, RunOptions};
 use gs_server::storage::StoreError;
 use mission::LinkState;
-use run_support::{Folder, Pty, Server, heartbeat, until};
+use crate::support::{Folder, Pty, Server, heartbeat, until};
 
 const SOON: Duration = Duration::from_secs(3);
 

@@ -1,5 +1,4 @@
 //! A server in a test: its folder, its pseudo-terminal, its start and its end.
-#![expect(dead_code, reason = "each test file takes what it needs")]
 
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -17,17 +16,17 @@ use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 #[expect(clippy::disallowed_methods, reason = "these tests watch a real server from outside")]
-pub async fn pause(duration: Duration) {
+pub(crate) async fn pause(duration: Duration) {
     tokio::time::sleep(duration).await;
 }
 
 #[expect(clippy::disallowed_methods, reason = "these tests watch a real server from outside")]
-pub fn wall() -> Instant {
+pub(crate) fn wall() -> Instant {
     Instant::now()
 }
 
 /// Waits until something holds; fails after `limit`. How long it took.
-pub async fn until(what: &str, limit: Duration, mut holds: impl AsyncFnMut() -> bool) -> Duration {
+pub(crate) async fn until(what: &str, limit: Duration, mut holds: impl AsyncFnMut() -> bool) -> Duration {
     let began = wall();
     while !holds().await {
         assert!(began.elapsed() < limit, "after {limit:?} still not: {what}");
@@ -37,13 +36,13 @@ pub async fn until(what: &str, limit: Duration, mut holds: impl AsyncFnMut() -> 
 }
 
 /// A pseudo-terminal behind a path that stays the same when the terminal is another.
-pub struct Pty {
-    pub master: TTYPort,
+pub(crate) struct Pty {
+    pub(crate) master: TTYPort,
     _slave: TTYPort,
 }
 
 impl Pty {
-    pub fn at(link: &Path) -> Self {
+    pub(crate) fn at(link: &Path) -> Self {
         use serialport::SerialPort as _;
         let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
         master.set_timeout(Duration::from_millis(20)).expect("a time-out");
@@ -54,18 +53,18 @@ impl Pty {
     }
 
     /// What arrived within the time-out.
-    pub fn read(&mut self) -> Vec<u8> {
+    pub(crate) fn read(&mut self) -> Vec<u8> {
         let mut buffer = [0; 1024];
         self.master.read(&mut buffer).map(|count| buffer[..count].to_vec()).unwrap_or_default()
     }
 
-    pub fn write(&mut self, bytes: &[u8]) {
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
         self.master.write_all(bytes).expect("the terminal takes bytes");
     }
 }
 
 /// A heartbeat with this uptime, as it stands on the wire.
-pub fn heartbeat(uptime_ms: u32) -> Vec<u8> {
+pub(crate) fn heartbeat(uptime_ms: u32) -> Vec<u8> {
     let beat = Heartbeat {
         r_teme_km: [6_800.0, 0.0, 0.0],
         v_teme_km_s: [0.0, 7.6, 0.0],
@@ -86,27 +85,28 @@ pub fn heartbeat(uptime_ms: u32) -> Vec<u8> {
 }
 
 /// A configuration of one strapped pseudo-terminal with a simulated key, in a folder of its own.
-pub struct Folder {
-    pub dir: TempDir,
+pub(crate) struct Folder {
+    pub(crate) dir: TempDir,
 }
 
 impl Folder {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let dir = tempfile::tempdir().expect("a folder");
         let mut key = *b"0123456789abcdef";
         gs_server::keys::create(&dir.path().join("test.key"), &mut key, true).expect("a key");
         Self { dir }
     }
 
-    pub fn port(&self) -> PathBuf {
+    pub(crate) fn port(&self) -> PathBuf {
         self.dir.path().join("port")
     }
 
-    pub fn config(&self, link_extra: &str) -> Config {
+    pub(crate) fn config(&self, link_extra: &str) -> Config {
         let text = format!(
             r#"
             [station]
             name = "test"
+            clock = "trust"
             [[satellites]]
             name = "sat"
             key_file = "test.key"
@@ -129,20 +129,20 @@ impl Folder {
         Config::from_toml(&text, self.dir.path()).expect("a configuration")
     }
 
-    pub fn strapped(&self) -> Config {
+    pub(crate) fn strapped(&self) -> Config {
         self.config("mode_pins = \"strapped\"\ntransmit_unverified = true")
     }
 }
 
 /// A server that runs.
-pub struct Server {
-    pub ready: Ready,
-    pub stop: CancellationToken,
-    pub task: JoinHandle<Result<Report, RunError>>,
+pub(crate) struct Server {
+    pub(crate) ready: Ready,
+    pub(crate) stop: CancellationToken,
+    pub(crate) task: JoinHandle<Result<Report, RunError>>,
 }
 
 impl Server {
-    pub async fn start(mut options: RunOptions) -> Result<Self, RunError> {
+    pub(crate) async fn start(mut options: RunOptions) -> Result<Self, RunError> {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let (told, ready) = oneshot::channel();
         options.ready = Some(told);
@@ -154,19 +154,19 @@ impl Server {
         }
     }
 
-    pub fn status(&self) -> std::sync::Arc<Status> {
+    pub(crate) fn status(&self) -> std::sync::Arc<Status> {
         self.ready.engine.status()
     }
 
-    pub fn link(&self) -> LinkState {
+    pub(crate) fn link(&self) -> LinkState {
         self.status().links[0].state.clone()
     }
 
-    pub async fn until_link(&self, what: &str, limit: Duration, holds: impl Fn(&LinkState) -> bool) -> Duration {
+    pub(crate) async fn until_link(&self, what: &str, limit: Duration, holds: impl Fn(&LinkState) -> bool) -> Duration {
         until(what, limit, async || holds(&self.link())).await
     }
 
-    pub async fn stop(self) -> (Duration, Report) {
+    pub(crate) async fn stop(self) -> (Duration, Report) {
         let began = wall();
         self.stop.cancel();
         let report = self.task.await.expect("no panic").expect("a clean end");

@@ -1,14 +1,12 @@
 //! The serial link over real pseudo-terminals.
 
-mod run_support;
-
 use std::time::Duration;
 
 use gs_server::run::RunOptions;
 use gs_server::storage::FrameQuery;
 use mission::{Accepted, CommandIntent, Gate, Intent, LinkState, Principal, SatelliteId};
 use protocol::Telecommand;
-use run_support::{Folder, Pty, Server, heartbeat, pause, until};
+use crate::support::{Folder, Pty, Server, heartbeat, pause, until};
 
 const SOON: Duration = Duration::from_secs(3);
 
