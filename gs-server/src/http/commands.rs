@@ -1,6 +1,8 @@
 //! `/api/v1/commands`: telecommands, asked for, looked at, withdrawn.
 
-use api::{CommandRequest, CommandView, GateWord, Nothing, Page, Problem, ProblemKind, StageView, telecommand};
+use api::{
+    CommandRequest, CommandView, GateWord, Nothing, Page, Problem, ProblemKind, StageView, telecommand,
+};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -34,7 +36,8 @@ pub(super) async fn list(
     let query = CommandQuery {
         scope: scope(&asked.satellite, &asked.station, &asked.link),
         key: asked.key,
-        stage: stage.map_err(|error| Failure::field(ProblemKind::BadParameter, "stage", error.to_string()))?,
+        stage: stage
+            .map_err(|error| Failure::field(ProblemKind::BadParameter, "stage", error.to_string()))?,
         page: page(asked.after, asked.before, asked.limit)?,
     };
     let commands = app.state.store.commands(&query).await?;
@@ -50,12 +53,19 @@ pub(super) async fn get(State(app): State<App>, id: Id) -> Result<Json<CommandVi
     Ok(Json(command))
 }
 
-pub(super) async fn create(State(app): State<App>, write: Write<CommandRequest>) -> Result<Response, Failure> {
+pub(super) async fn create(
+    State(app): State<App>,
+    write: Write<CommandRequest>,
+) -> Result<Response, Failure> {
     let intent = Intent::Command(intent(&app, &write.body)?);
     write.submit(&app, intent).await
 }
 
-pub(super) async fn cancel(State(app): State<App>, id: Id, write: Write<Nothing>) -> Result<Response, Failure> {
+pub(super) async fn cancel(
+    State(app): State<App>,
+    id: Id,
+    write: Write<Nothing>,
+) -> Result<Response, Failure> {
     write.submit(&app, Intent::Cancel(CommandId(id.0))).await
 }
 
@@ -63,7 +73,8 @@ fn intent(app: &App, request: &CommandRequest) -> Result<CommandIntent, Failure>
     let telecommand = telecommand::parse(&request.command, &request.arguments).map_err(|errors| {
         let told: Vec<String> = errors.iter().map(ToString::to_string).collect();
         let problem = Problem::new(ProblemKind::BadArgument, told.join("; "));
-        let problem = errors.into_iter().fold(problem, |problem, error| problem.with_field(error.field, error.message));
+        let problem =
+            errors.into_iter().fold(problem, |problem, error| problem.with_field(error.field, error.message));
         Failure(Box::new(problem))
     })?;
     if request.attempts == Some(0) {

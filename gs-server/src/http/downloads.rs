@@ -27,13 +27,20 @@ pub(super) async fn get(State(app): State<App>, id: Id) -> Result<Json<DownloadV
     row.map(|row| Json(view(row))).ok_or_else(|| Failure::no_such("download", id.0))
 }
 
-pub(super) async fn create(State(app): State<App>, write: Write<DownloadRequest>) -> Result<Response, Failure> {
+pub(super) async fn create(
+    State(app): State<App>,
+    write: Write<DownloadRequest>,
+) -> Result<Response, Failure> {
     let satellite = satellite(&app, write.body.satellite.as_deref())?;
     let link = write.body.link.as_deref().map(link).transpose()?;
     write.submit(&app, Intent::Download { satellite, link }).await
 }
 
-pub(super) async fn cancel(State(app): State<App>, id: Id, write: Write<Nothing>) -> Result<Response, Failure> {
+pub(super) async fn cancel(
+    State(app): State<App>,
+    id: Id,
+    write: Write<Nothing>,
+) -> Result<Response, Failure> {
     write.submit(&app, Intent::CancelDownload(DownloadId(id.0))).await
 }
 

@@ -50,7 +50,10 @@ pub(super) async fn list(
 
 fn kinds(words: &str) -> Result<Vec<EventKind>, String> {
     let find = |word: &str| {
-        EventKind::ALL.into_iter().find(|kind| kind.name() == word).ok_or_else(|| word.chars().take(40).collect())
+        EventKind::ALL
+            .into_iter()
+            .find(|kind| kind.name() == word)
+            .ok_or_else(|| word.chars().take(40).collect())
     };
     words.split(',').map(find).collect()
 }

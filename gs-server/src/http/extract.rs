@@ -102,11 +102,19 @@ impl ListQuery {
     }
 }
 
-pub(super) fn scope(satellite: &Option<String>, station: &Option<String>, link: &Option<String>) -> storage::Scope {
+pub(super) fn scope(
+    satellite: &Option<String>,
+    station: &Option<String>,
+    link: &Option<String>,
+) -> storage::Scope {
     storage::Scope { satellite: satellite.clone(), station: station.clone(), link: link.clone() }
 }
 
-pub(super) fn page(after: Option<i64>, before: Option<i64>, asked: Option<u32>) -> Result<storage::Page, Failure> {
+pub(super) fn page(
+    after: Option<i64>,
+    before: Option<i64>,
+    asked: Option<u32>,
+) -> Result<storage::Page, Failure> {
     Ok(storage::Page { after, before, limit: limit(asked)? })
 }
 
@@ -135,17 +143,16 @@ pub(super) fn satellite(app: &App, named: Option<&str>) -> Result<SatelliteId, F
             "satellite",
             format!("name one of: {}", known()),
         )),
-        (Some(name), satellites) => satellites
-            .iter()
-            .find_map(|(id, _)| (id.as_str() == name).then(|| id.clone()))
-            .ok_or_else(|| {
+        (Some(name), satellites) => {
+            satellites.iter().find_map(|(id, _)| (id.as_str() == name).then(|| id.clone())).ok_or_else(|| {
                 let shown: String = name.chars().take(40).collect();
                 Failure::field(
                     ProblemKind::UnknownSatellite,
                     "satellite",
                     format!("'{shown}' is not in the configuration; there is {}", known()),
                 )
-            }),
+            })
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! `GET /api/v1/frames` and `/api/v1/frames/{id}`: what was heard, byte for byte.
 
-use api::{FrameView, Page, PacketView, ReceptionView};
+use api::{FrameView, PacketView, Page, ReceptionView};
 use axum::Json;
 use axum::extract::State;
 use protocol::{DownFrame, Downlink};

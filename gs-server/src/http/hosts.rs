@@ -15,7 +15,8 @@ impl AllowedHosts {
     #[must_use]
     pub fn new(listening: SocketAddr, configured: &[String]) -> Self {
         let port = listening.port();
-        let mut names: Vec<String> = ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}")).into();
+        let mut names: Vec<String> =
+            ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}")).into();
         if !listening.ip().is_unspecified() {
             names.push(listening.to_string());
         }
@@ -30,7 +31,8 @@ impl AllowedHosts {
         }
         // Browsers leave the usual port out.
         if port == 80 {
-            let short: Vec<String> = names.iter().filter_map(|name| name.strip_suffix(":80")).map(str::to_owned).collect();
+            let short: Vec<String> =
+                names.iter().filter_map(|name| name.strip_suffix(":80")).map(str::to_owned).collect();
             names.extend(short);
         }
         names.sort_unstable();
@@ -48,7 +50,9 @@ impl AllowedHosts {
 fn has_port(name: &str) -> bool {
     match name.rsplit_once(':') {
         Some((head, port)) => {
-            !port.is_empty() && port.bytes().all(|b| b.is_ascii_digit()) && (!head.contains(':') || head.ends_with(']'))
+            !port.is_empty()
+                && port.bytes().all(|b| b.is_ascii_digit())
+                && (!head.contains(':') || head.ends_with(']'))
         }
         None => false,
     }
@@ -75,7 +79,14 @@ mod tests {
         for good in ["127.0.0.1:8700", "localhost:8700", "LOCALHOST:8700", "[::1]:8700"] {
             assert!(hosts.allows(good), "{good}");
         }
-        for bad in ["localhost", "localhost:8701", "evil.example:8700", "127.0.0.1.evil.example:8700", "", "localhost:8700 "] {
+        for bad in [
+            "localhost",
+            "localhost:8701",
+            "evil.example:8700",
+            "127.0.0.1.evil.example:8700",
+            "",
+            "localhost:8700 ",
+        ] {
             assert!(!hosts.allows(bad), "{bad}");
         }
     }
@@ -83,7 +94,9 @@ mod tests {
     #[test]
     fn configured_names_count_with_and_without_the_port() {
         let hosts = hosts("0.0.0.0:8700", &["Ground.example.org", "proxy.example.org:443", "[fd00::1]"]);
-        for good in ["ground.example.org", "ground.example.org:8700", "proxy.example.org:443", "[fd00::1]:8700"] {
+        for good in
+            ["ground.example.org", "ground.example.org:8700", "proxy.example.org:443", "[fd00::1]:8700"]
+        {
             assert!(hosts.allows(good), "{good}");
         }
         assert!(!hosts.allows("proxy.example.org") && !hosts.allows("0.0.0.0:8700"));
@@ -98,7 +111,13 @@ mod tests {
     fn an_origin_must_name_the_same_host_and_port() {
         assert!(is_same_origin("http://localhost:8700", "localhost:8700"));
         assert!(is_same_origin("https://ground.example.org", "ground.example.org"));
-        for bad in ["null", "http://localhost:8701", "http://evil.example", "file://", "http://localhost:8700.evil.example"] {
+        for bad in [
+            "null",
+            "http://localhost:8701",
+            "http://evil.example",
+            "file://",
+            "http://localhost:8700.evil.example",
+        ] {
             assert!(!is_same_origin(bad, "localhost:8700"), "{bad}");
         }
     }

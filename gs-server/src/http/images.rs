@@ -36,7 +36,9 @@ pub(super) async fn chunks(State(app): State<App>, id: Id) -> Result<Json<ChunkM
         (Some(_), true) => '#',
         (None, true) => '.',
     };
-    let count = |test: &dyn Fn(&ChunkState) -> bool| small(image.chunks.iter().filter(|chunk| test(chunk)).count() as i64);
+    let count = |test: &dyn Fn(&ChunkState) -> bool| {
+        small(image.chunks.iter().filter(|chunk| test(chunk)).count() as i64)
+    };
     Ok(Json(ChunkMap {
         image: id.0,
         chunks: small(image.chunks.len() as i64),
@@ -49,7 +51,8 @@ pub(super) async fn chunks(State(app): State<App>, id: Id) -> Result<Json<ChunkM
 
 /// The file as far as it is held: what is missing is zero. `x-image-complete` says whether anything is.
 pub(super) async fn file(State(app): State<App>, id: Id, headers: HeaderMap) -> Result<Response, Failure> {
-    let image = app.state.store.image_bytes(id.row()).await?.ok_or_else(|| Failure::no_such("image", id.0))?;
+    let image =
+        app.state.store.image_bytes(id.row()).await?.ok_or_else(|| Failure::no_such("image", id.0))?;
     let tag = format!("\"{}\"", hex::encode(Sha256::digest(&image.bytes)));
     let known = headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes());
     let mut response = match known {

@@ -11,11 +11,19 @@ use super::extract::Name;
 use super::problem::Failure;
 use super::write::Write;
 
-pub(super) async fn arm(State(app): State<App>, name: Name, write: Write<Nothing>) -> Result<Response, Failure> {
+pub(super) async fn arm(
+    State(app): State<App>,
+    name: Name,
+    write: Write<Nothing>,
+) -> Result<Response, Failure> {
     set(&app, &name, true, write).await
 }
 
-pub(super) async fn disarm(State(app): State<App>, name: Name, write: Write<Nothing>) -> Result<Response, Failure> {
+pub(super) async fn disarm(
+    State(app): State<App>,
+    name: Name,
+    write: Write<Nothing>,
+) -> Result<Response, Failure> {
     set(&app, &name, false, write).await
 }
 

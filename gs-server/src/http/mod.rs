@@ -91,8 +91,10 @@ impl Identity {
     /// The identity of a configured station.
     #[must_use]
     pub fn of(config: &StationConfig, simulated: bool) -> Self {
-        let satellites =
-            config.satellites.iter().map(|satellite| (satellite.id.clone(), satellite.key.as_ref().map(|key| key.id())));
+        let satellites = config
+            .satellites
+            .iter()
+            .map(|satellite| (satellite.id.clone(), satellite.key.as_ref().map(|key| key.id())));
         Self { station: config.station.clone(), satellites: satellites.collect(), simulated }
     }
 }
@@ -107,8 +109,11 @@ struct App {
 
 /// The API and the page.
 pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
-    let app =
-        App { state: Arc::new(state), hosts: Arc::new(allowed_hosts), streams: Arc::new(Semaphore::new(STREAMS_MAX)) };
+    let app = App {
+        state: Arc::new(state),
+        hosts: Arc::new(allowed_hosts),
+        streams: Arc::new(Semaphore::new(STREAMS_MAX)),
+    };
     routes::table()
         .into_iter()
         .fold(Router::new(), |router, route| route.add_to(router, &app))
@@ -121,7 +126,11 @@ pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
 ///
 /// # Errors
 /// When the listener fails.
-pub async fn serve(listener: tokio::net::TcpListener, router: Router, stop: CancellationToken) -> io::Result<()> {
+pub async fn serve(
+    listener: tokio::net::TcpListener,
+    router: Router,
+    stop: CancellationToken,
+) -> io::Result<()> {
     // Small messages on a live page: never wait for more to fill a packet.
     let listener = listener.tap_io(|stream| {
         if let Err(error) = stream.set_nodelay(true) {

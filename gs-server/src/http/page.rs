@@ -43,7 +43,8 @@ pub(super) async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result
 fn answer(media_type: &'static str, content: &'static str, headers: &HeaderMap) -> Response {
     let tag = format!("W/\"{}\"", hex::encode(&Sha256::digest(content)[..8]));
     let is_known = headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes());
-    let mut response = if is_known { StatusCode::NOT_MODIFIED.into_response() } else { content.into_response() };
+    let mut response =
+        if is_known { StatusCode::NOT_MODIFIED.into_response() } else { content.into_response() };
     let headers = response.headers_mut();
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(media_type));
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));

@@ -42,12 +42,21 @@ impl IntoResponse for Failure {
 impl From<StoreError> for Failure {
     fn from(error: StoreError) -> Self {
         let detail = if error.is_temporary() {
-            tracing::warn!(error = &error as &dyn std::error::Error, "The archive could not be read for a request.");
-            return Self::new(ProblemKind::StorageFailing, "The archive cannot be read at present. Try again.");
+            tracing::warn!(
+                error = &error as &dyn std::error::Error,
+                "The archive could not be read for a request."
+            );
+            return Self::new(
+                ProblemKind::StorageFailing,
+                "The archive cannot be read at present. Try again.",
+            );
         } else {
             "The archive could not be read; the server's log says more."
         };
-        tracing::error!(error = &error as &dyn std::error::Error, "The archive could not be read for a request.");
+        tracing::error!(
+            error = &error as &dyn std::error::Error,
+            "The archive could not be read for a request."
+        );
         Self::new(ProblemKind::Internal, detail)
     }
 }
@@ -96,14 +105,20 @@ impl From<Refusal> for Failure {
 /// What an error of the router or of axum itself is called.
 fn kind_of(status: StatusCode) -> (ProblemKind, &'static str) {
     match status {
-        StatusCode::NOT_FOUND => (ProblemKind::NotFound, "This path leads nowhere; docs/api.md lists the paths."),
+        StatusCode::NOT_FOUND => {
+            (ProblemKind::NotFound, "This path leads nowhere; docs/api.md lists the paths.")
+        }
         StatusCode::METHOD_NOT_ALLOWED => {
             (ProblemKind::MethodNotAllowed, "The header Allow names the methods that this path takes.")
         }
         StatusCode::PAYLOAD_TOO_LARGE => (ProblemKind::BodyTooLarge, "A body may have 65536 bytes at most."),
-        StatusCode::UNSUPPORTED_MEDIA_TYPE => (ProblemKind::WrongMediaType, "Send Content-Type: application/json."),
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => {
+            (ProblemKind::WrongMediaType, "Send Content-Type: application/json.")
+        }
         StatusCode::UPGRADE_REQUIRED => (ProblemKind::UpgradeRequired, "Open this path as a WebSocket."),
-        status if status.is_client_error() => (ProblemKind::BadParameter, "The request could not be understood."),
+        status if status.is_client_error() => {
+            (ProblemKind::BadParameter, "The request could not be understood.")
+        }
         _ => (ProblemKind::Internal, "The server failed; its log says more."),
     }
 }

@@ -7,7 +7,10 @@ use axum::middleware::from_fn_with_state;
 use axum::routing::{MethodRouter, get, post};
 
 use super::write::guard_write;
-use super::{App, clock, commands, downloads, events, frames, images, keys, links, page, station, status, stream, telemetry};
+use super::{
+    App, clock, commands, downloads, events, frames, images, keys, links, page, station, status, stream,
+    telemetry,
+};
 
 /// What a path is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,10 @@ use std::time::Duration;
 
 use api::{API_VERSION, ProblemKind, StreamMessage};
 use axum::extract::State;
-use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade, close_code, rejection::WebSocketUpgradeRejection};
+use axum::extract::ws::{
+    CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade, close_code,
+    rejection::WebSocketUpgradeRejection,
+};
 use axum::http::HeaderMap;
 use axum::response::Response;
 use serde::Deserialize;
@@ -54,8 +57,9 @@ pub(super) async fn open(
 ) -> Result<Response, Failure> {
     // Browsers do not apply the same-origin rule to WebSockets: we must.
     check_origin(&headers)?;
-    let upgrade = upgrade
-        .map_err(|_| Failure::new(ProblemKind::UpgradeRequired, "Open this path as a WebSocket (ws:// or wss://)."))?;
+    let upgrade = upgrade.map_err(|_| {
+        Failure::new(ProblemKind::UpgradeRequired, "Open this path as a WebSocket (ws:// or wss://).")
+    })?;
     let place = Arc::clone(&app.streams).try_acquire_owned().map_err(|_| {
         Failure::new(ProblemKind::TooManyStreams, format!("{} streams are open already.", super::STREAMS_MAX))
     })?;
@@ -178,7 +182,10 @@ impl Follower {
         }
     }
 
-    async fn pass_on(&mut self, event: Result<Arc<StoredEvent>, broadcast::error::RecvError>) -> ControlFlow<End> {
+    async fn pass_on(
+        &mut self,
+        event: Result<Arc<StoredEvent>, broadcast::error::RecvError>,
+    ) -> ControlFlow<End> {
         match event {
             Ok(event) if event.sequence <= self.last => ControlFlow::Continue(()),
             // The archive fills a hole, whatever made it.
@@ -255,7 +262,10 @@ fn archive<T>(result: Result<T, StoreError>) -> ControlFlow<End, T> {
     match result {
         Ok(value) => ControlFlow::Continue(value),
         Err(error) => {
-            tracing::warn!(error = &error as &dyn std::error::Error, "A stream ends: the archive could not be read.");
+            tracing::warn!(
+                error = &error as &dyn std::error::Error,
+                "A stream ends: the archive could not be read."
+            );
             ControlFlow::Break(End::Archive)
         }
     }

@@ -53,7 +53,9 @@ pub(super) async fn series(
     let Some(series) = app.state.store.telemetry(&query).await? else {
         return Err(Failure::new(
             ProblemKind::NotFound,
-            format!("{satellite} was never heard to have this parameter; /api/v1/parameters lists those it has."),
+            format!(
+                "{satellite} was never heard to have this parameter; /api/v1/parameters lists those it has."
+            ),
         ));
     };
     let (samples, buckets) = match series.samples {
@@ -127,7 +129,10 @@ pub(super) async fn latest(
 
 pub(super) async fn parameters(State(app): State<App>) -> Result<Json<Page<ParameterView>>, Failure> {
     let rows = app.state.store.parameters().await?;
-    let views =
-        rows.into_iter().map(|row| ParameterView { parameter: row.name, unit: row.unit, satellite: row.satellite });
+    let views = rows.into_iter().map(|row| ParameterView {
+        parameter: row.name,
+        unit: row.unit,
+        satellite: row.satellite,
+    });
     Ok(Json(whole(views.collect())))
 }

@@ -62,7 +62,10 @@ impl Token {
     #[must_use]
     pub fn new(secret: &str) -> Option<Self> {
         let legal = secret.len() >= LEN_MIN && secret.bytes().all(|b| b.is_ascii_graphic());
-        legal.then(|| Self { secret: Zeroizing::new(secret.to_owned()), digest: Sha256::digest(secret).into() })
+        legal.then(|| Self {
+            secret: Zeroizing::new(secret.to_owned()),
+            digest: Sha256::digest(secret).into(),
+        })
     }
 
     /// Reads the token file; makes it, with mode 0600, when there is none.
@@ -72,7 +75,9 @@ impl Token {
     /// token.
     pub fn load_or_create(path: &Path) -> Result<Self, TokenError> {
         match Self::load(path) {
-            Err(TokenError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => Self::create(path),
+            Err(TokenError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+                Self::create(path)
+            }
             other => other,
         }
     }
@@ -102,7 +107,10 @@ impl Token {
         let secret = Zeroizing::new(hex::encode(bytes.as_ref()));
         let mut file: File =
             OpenOptions::new().write(true).create_new(true).mode(0o600).open(path).map_err(failed)?;
-        file.write_all(secret.as_bytes()).and_then(|()| file.write_all(b"\n")).and_then(|()| file.sync_all()).map_err(failed)?;
+        file.write_all(secret.as_bytes())
+            .and_then(|()| file.write_all(b"\n"))
+            .and_then(|()| file.sync_all())
+            .map_err(failed)?;
         Self::new(&secret).ok_or_else(|| TokenError::Malformed { path: path.to_owned() })
     }
 

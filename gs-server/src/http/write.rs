@@ -76,7 +76,9 @@ async fn check(app: &App, request: Request) -> Result<Request, Failure> {
 
 fn check_token(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     let given = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());
-    let bearer = given.and_then(|value| value.split_once(' ')).filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
+    let bearer = given
+        .and_then(|value| value.split_once(' '))
+        .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
     match bearer {
         Some((_, token)) if app.state.token.matches(token.trim()) => Ok(()),
         Some(_) => Err(Failure::new(
@@ -93,7 +95,10 @@ fn check_token(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
 fn idempotency_key(headers: &HeaderMap) -> Result<String, Failure> {
     let mut keys = headers.get_all(IDEMPOTENCY_KEY).iter();
     let key = keys.next().and_then(|key| key.to_str().ok()).unwrap_or("");
-    if keys.next().is_none() && (1..=KEY_MAX).contains(&key.len()) && key.bytes().all(|b| b.is_ascii_graphic()) {
+    if keys.next().is_none()
+        && (1..=KEY_MAX).contains(&key.len())
+        && key.bytes().all(|b| b.is_ascii_graphic())
+    {
         return Ok(key.to_owned());
     }
     Err(Failure::new(
@@ -179,7 +184,9 @@ fn outcome(accepted: &Accepted) -> (Outcome, Option<String>) {
             Outcome { command: Some(id.0), ..plain(OutcomeWord::CommandQueued) },
             Some(format!("/api/v1/commands/{id}")),
         ),
-        Accepted::Cancelled(id) => (Outcome { command: Some(id.0), ..plain(OutcomeWord::CommandCancelled) }, None),
+        Accepted::Cancelled(id) => {
+            (Outcome { command: Some(id.0), ..plain(OutcomeWord::CommandCancelled) }, None)
+        }
         Accepted::Download(id) => (
             Outcome { download: Some(id.0), ..plain(OutcomeWord::DownloadOrdered) },
             Some(format!("/api/v1/downloads/{id}")),

@@ -1,0 +1,266 @@
+//! A real store in a temporary folder and a real engine, heard by a satellite made of bytes.
+
+mod page;
+mod reads;
+mod security;
+mod stream;
+mod writes;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::{Body, to_bytes};
+use axum::http::{Method, Request, StatusCode, header};
+use mission::{LinkConfig, LinkId, Profile, SatelliteConfig, SatelliteId, Source, StationConfig, StationId};
+use protocol::{ChunkIndex, Downlink, FrameForm, Heartbeat, ImageChunk, ImageInfo, Key, encode_down};
+use radio::airtime::{LinkTiming, LoraPhy};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tower::ServiceExt as _;
+
+use super::{AllowedHosts, HttpState, Identity, Token, router, serve};
+use crate::clock::{SystemClock, Timer, wall_sleep};
+use crate::config::ClockSetting;
+use crate::engine::{Engine, EngineInbox, EngineMessage, EngineParts, LinkPort, OsEntropy};
+use crate::hub::Hub;
+use crate::storage::{Store, StoreOptions};
+
+const HOST: &str = "127.0.0.1:8700";
+const TOKEN: &str = "0123456789abcdef0123456789abcdef";
+
+/// A whole server but for its links.
+struct Bench {
+    router: Router,
+    store: Store,
+    hub: Hub,
+    inbox: EngineInbox,
+    stop: CancellationToken,
+    timer: Arc<dyn Timer>,
+    _folder: TempDir,
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        self.stop.cancel();
+    }
+}
+
+impl Bench {
+    async fn new() -> Self {
+        Self::listening("127.0.0.1:8700".parse().unwrap()).await
+    }
+
+    async fn listening(address: std::net::SocketAddr) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(StoreOptions {
+            folder: folder.path().join("data"),
+            simulated: true,
+            max_page_count: None,
+            reserve_bytes: 1 << 16,
+        });
+        let store = store.await.unwrap();
+        let station = station();
+        let timer: Arc<dyn Timer> = Arc::new(SystemClock::new());
+        let hub = Hub::new();
+        let satellites: Vec<SatelliteId> = station.satellites.iter().map(|s| s.id.clone()).collect();
+        let keys: Vec<_> = station.satellites.iter().filter_map(|s| s.key.as_ref().map(Key::id)).collect();
+        let snapshot = store.snapshot(&satellites, &keys).await.unwrap();
+        let (port, mut link) = LinkPort::new(LinkId::new("e22").unwrap());
+        let identity = Identity::of(&station, true);
+        let (engine, inbox, handle) = Engine::new(EngineParts {
+            station,
+            snapshot,
+            recovered: Vec::new(),
+            store: store.clone(),
+            timer: Arc::clone(&timer),
+            clock: ClockSetting::Trust,
+            entropy: Box::new(OsEntropy),
+            hub: hub.clone(),
+            links: vec![port],
+        });
+        let stop = CancellationToken::new();
+        tokio::spawn(engine.run(stop.clone(), stop.clone()));
+        // A radio that takes everything and never answers.
+        tokio::spawn(async move { while link.recv().await.is_some() {} });
+        let state = HttpState {
+            store: store.clone(),
+            engine: handle,
+            hub: hub.clone(),
+            timer: Arc::clone(&timer),
+            token: Token::new(TOKEN).unwrap(),
+            identity,
+            demo: Some(json!({"speed": 1.0})),
+            stop: stop.clone(),
+        };
+        let router = router(state, AllowedHosts::new(address, &[HOST.to_owned()]));
+        let bench = Self { router, store, hub, inbox, stop, timer, _folder: folder };
+        // The engine tells that it began; tests count from there.
+        bench.until("/api/v1/station", "/last_sequence", &json!(1)).await;
+        bench
+    }
+
+    /// Waits until a path shows a value at a JSON pointer: the status follows what was stored a little later.
+    async fn until(&self, path: &str, pointer: &str, wanted: &Value) {
+        for _ in 0..500 {
+            if self.get(path).await.ok().pointer(pointer) == Some(wanted) {
+                return;
+            }
+            wall_sleep(Duration::from_millis(10)).await;
+        }
+        panic!("{path} never showed {wanted} at {pointer}");
+    }
+
+    async fn send(&self, request: Request<Body>) -> Answer {
+        let response = self.router.clone().oneshot(request).await.unwrap();
+        let (parts, body) = response.into_parts();
+        let bytes = to_bytes(body, 1 << 20).await.unwrap();
+        Answer { parts, bytes: bytes.to_vec() }
+    }
+
+    async fn get(&self, path: &str) -> Answer {
+        self.send(request(Method::GET, path).body(Body::empty()).unwrap()).await
+    }
+
+    async fn post(&self, path: &str, key: &str, body: &Value) -> Answer {
+        self.send(write(path, key).body(Body::from(body.to_string())).unwrap()).await
+    }
+
+    /// Bytes as a radio hands them over.
+    async fn hear(&self, packet: &Downlink) {
+        let mut frame = [0; 240];
+        let length = encode_down(packet, None, FrameForm::Full, &mut frame);
+        let mut bytes = frame[..length].to_vec();
+        bytes.push(170);
+        let link = LinkId::new("e22").unwrap();
+        let received = self.timer.now();
+        self.inbox.send(EngineMessage::Bytes { link, bytes, source: Source::Radio, received }).await;
+    }
+
+    /// Waits until the archive has so many frames.
+    async fn frames(&self, count: i64) {
+        for _ in 0..500 {
+            if self.store.counts().await.unwrap().frames >= count {
+                return;
+            }
+            wall_sleep(Duration::from_millis(10)).await;
+        }
+        panic!("the archive never had {count} frames");
+    }
+
+    /// A bench on a real socket.
+    async fn on_a_socket() -> (Self, std::net::SocketAddr) {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let bench = Self::listening(address).await;
+        tokio::spawn(serve(listener, bench.router.clone(), bench.stop.clone()));
+        (bench, address)
+    }
+}
+
+struct Answer {
+    parts: axum::http::response::Parts,
+    bytes: Vec<u8>,
+}
+
+impl Answer {
+    fn status(&self) -> StatusCode {
+        self.parts.status
+    }
+
+    fn header(&self, name: &str) -> &str {
+        self.parts.headers.get(name).map_or("", |value| value.to_str().unwrap())
+    }
+
+    fn json(&self) -> Value {
+        serde_json::from_slice(&self.bytes)
+            .unwrap_or_else(|_| panic!("no JSON: {:?}", String::from_utf8_lossy(&self.bytes)))
+    }
+
+    /// The last part of the problem's type; fails when the answer is no problem.
+    #[track_caller]
+    fn problem(&self) -> String {
+        assert_eq!(self.header("content-type"), "application/problem+json", "{:?}", self.status());
+        let problem = self.json();
+        assert_eq!(problem["status"], self.status().as_u16());
+        for field in ["title", "detail", "instance"] {
+            assert!(problem[field].as_str().is_some_and(|text| !text.is_empty()), "{field}: {problem}");
+        }
+        problem["type"].as_str().unwrap().strip_prefix("urn:pixelsat-ground:problem:").unwrap().to_owned()
+    }
+
+    #[track_caller]
+    fn ok(&self) -> Value {
+        assert!(self.status().is_success(), "{}: {}", self.status(), String::from_utf8_lossy(&self.bytes));
+        self.json()
+    }
+}
+
+fn request(method: Method, path: &str) -> axum::http::request::Builder {
+    Request::builder().method(method).uri(path).header(header::HOST, HOST)
+}
+
+/// A write with everything that it needs.
+fn write(path: &str, key: &str) -> axum::http::request::Builder {
+    request(Method::POST, path)
+        .header(header::AUTHORIZATION, format!("Bearer {TOKEN}"))
+        .header(header::CONTENT_TYPE, "application/json")
+        .header("idempotency-key", key)
+}
+
+fn station() -> StationConfig {
+    let satellite = SatelliteId::new("pixelsat-1").unwrap();
+    StationConfig {
+        station: StationId::new("bench").unwrap(),
+        satellites: vec![SatelliteConfig {
+            id: satellite.clone(),
+            profile: Profile::default(),
+            key: Some(Key::from_bytes([7; 16])),
+            limits: Vec::new(),
+        }],
+        links: vec![LinkConfig {
+            id: LinkId::new("e22").unwrap(),
+            satellite,
+            timing: LinkTiming { phy: LoraPhy::LIKELY_2K4, baud: 9600, turn_round_us: 100_000 },
+            armed: true,
+            receive_only: false,
+        }],
+    }
+}
+
+fn heartbeat(temp_c: f32) -> Downlink {
+    Downlink::Heartbeat(Heartbeat {
+        r_teme_km: [6878.0, -120.5, 33.25],
+        v_teme_km_s: [0.1, 7.6, 0.02],
+        mag_t: [2.1e-5, -1.4e-5, f32::NAN],
+        omega_rad_s: [0.0012, -0.0034, 0.0101],
+        accel_m_s2: [0.0, 0.001, -0.002],
+        css: [0.91, 0.0, 0.13, 0.0, 0.0, 0.42],
+        att_mrp: [0.11, -0.2, 0.31],
+        rad: 3.5,
+        temp_c,
+        uptime_ms: 9_876_543,
+        timestamp_ms: 1_795_324_765_123,
+        cam: true,
+    })
+}
+
+fn image_info(size_bytes: u32) -> Downlink {
+    Downlink::ImageInfo(ImageInfo {
+        exists: true,
+        chunks: size_bytes.div_ceil(222),
+        size_bytes,
+        width_px: 408,
+        height_px: 304,
+    })
+}
+
+fn chunk(file: &[u8], index: u16) -> Downlink {
+    let mut data = [0; 222];
+    for (to, from) in data.iter_mut().zip(file.iter().skip(usize::from(index) * 222)) {
+        *to = *from;
+    }
+    Downlink::ImageChunk(ImageChunk { index: ChunkIndex(index), data })
+}

@@ -1,0 +1,166 @@
+//! The stream over a real socket.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use futures_util::{SinkExt as _, StreamExt as _};
+use serde_json::Value;
+use tokio::net::TcpStream;
+use tokio_tungstenite::tungstenite::client::IntoClientRequest as _;
+use tokio_tungstenite::tungstenite::{Error, Message};
+use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
+
+use super::{Bench, heartbeat};
+use crate::clock::within;
+
+type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
+
+async fn open(address: SocketAddr, query: &str) -> Socket {
+    connect_async(format!("ws://{address}/api/v1/stream{query}")).await.unwrap().0
+}
+
+async fn next(socket: &mut Socket) -> Value {
+    loop {
+        let message = within(Duration::from_secs(10), socket.next()).await.expect("a message in time");
+        match message.unwrap().unwrap() {
+            Message::Text(text) => return serde_json::from_str(&text).unwrap(),
+            Message::Close(frame) => {
+                return serde_json::json!({"type": "close", "code": frame.map(|f| u16::from(f.code))});
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Sequence numbers until so many events have come.
+async fn events(socket: &mut Socket, count: usize) -> Vec<i64> {
+    let mut found = Vec::new();
+    while found.len() < count {
+        let message = next(socket).await;
+        if message["type"] == "event" {
+            found.push(message["sequence"].as_i64().unwrap());
+        }
+    }
+    found
+}
+
+#[tokio::test]
+async fn a_stream_begins_with_hello_and_tells_the_status() {
+    let (_bench, address) = Bench::on_a_socket().await;
+    let mut socket = open(address, "").await;
+    let hello = next(&mut socket).await;
+    assert_eq!((&hello["type"], &hello["reset"]), (&"hello".into(), &false.into()));
+    assert_eq!(next(&mut socket).await["type"], "live");
+    let status = next(&mut socket).await;
+    assert_eq!((&status["type"], &status["station"]), (&"status".into(), &"bench".into()));
+    assert_eq!(status.get("sequence"), None);
+}
+
+#[tokio::test]
+async fn events_come_once_each_in_order_across_archive_and_live() {
+    let (bench, address) = Bench::on_a_socket().await;
+    for temp in 0..20u8 {
+        bench.hear(&heartbeat(f32::from(temp))).await;
+    }
+    bench.frames(20).await;
+    let mut socket = open(address, "?after=0").await;
+    // More arrives while the archive is still being read.
+    for temp in 20..60u8 {
+        bench.hear(&heartbeat(f32::from(temp))).await;
+    }
+    bench.frames(60).await;
+    let last = bench.store.last_event_seq().await.unwrap();
+    let all = events(&mut socket, usize::try_from(last).unwrap()).await;
+    assert_eq!(all, (1..=last).collect::<Vec<_>>());
+
+    let mut resumed = open(address, "?after=5").await;
+    assert_eq!(events(&mut resumed, 3).await, [6, 7, 8]);
+}
+
+#[tokio::test]
+async fn what_the_hub_left_out_is_read_from_the_archive() {
+    let (bench, address) = Bench::on_a_socket().await;
+    let mut socket = open(address, "?after=0").await;
+    while next(&mut socket).await["type"] != "live" {}
+    bench.hear(&heartbeat(1.0)).await;
+    bench.frames(1).await;
+    let first = events(&mut socket, 1).await;
+    // The same event for the second time, as after a lag: it is not sent again.
+    let stored = bench.store.events(&crate::storage::EventQuery::default()).await.unwrap();
+    for event in stored {
+        bench.hub.publish(event);
+    }
+    bench.hear(&heartbeat(2.0)).await;
+    bench.frames(2).await;
+    let last = bench.store.last_event_seq().await.unwrap();
+    let rest = events(&mut socket, usize::try_from(last - first[0]).unwrap()).await;
+    assert_eq!(rest, (first[0] + 1..=last).collect::<Vec<_>>());
+}
+
+#[tokio::test]
+async fn who_knows_more_than_the_archive_is_told_to_begin_anew() {
+    let (_bench, address) = Bench::on_a_socket().await;
+    let mut socket = open(address, "?after=4711").await;
+    let hello = next(&mut socket).await;
+    assert_eq!((&hello["reset"], &hello["after"]), (&true.into(), &hello["last_sequence"]));
+}
+
+#[tokio::test]
+async fn another_origin_gets_no_stream_and_the_own_one_does() {
+    let (_bench, address) = Bench::on_a_socket().await;
+    for (origin, may) in [
+        ("http://evil.example".to_owned(), false),
+        ("null".to_owned(), false),
+        (format!("http://{address}"), true),
+    ] {
+        let mut request = format!("ws://{address}/api/v1/stream").into_client_request().unwrap();
+        request.headers_mut().insert("origin", origin.parse().unwrap());
+        match connect_async(request).await {
+            Ok(_) => assert!(may, "{origin}"),
+            Err(Error::Http(response)) => {
+                assert!(!may, "{origin}");
+                assert_eq!(response.status(), 403);
+            }
+            Err(error) => panic!("{origin}: {error}"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_client_that_speaks_is_let_go_and_a_stopping_server_says_so() {
+    let (bench, address) = Bench::on_a_socket().await;
+    let mut talker = open(address, "").await;
+    talker.send(Message::text("hello")).await.unwrap();
+    let mut listener = open(address, "").await;
+    let end = |mut socket: Socket| async move {
+        loop {
+            let message = next(&mut socket).await;
+            if message["type"] == "close" {
+                return message["code"].clone();
+            }
+        }
+    };
+    assert_eq!(end(talker).await, 1003);
+    next(&mut listener).await;
+    bench.stop.cancel();
+    assert_eq!(end(listener).await, 1001);
+}
+
+#[tokio::test]
+async fn a_65th_stream_is_refused_and_a_closed_one_makes_room() {
+    let (_bench, address) = Bench::on_a_socket().await;
+    let mut sockets = Vec::new();
+    for _ in 0..super::super::STREAMS_MAX {
+        sockets.push(open(address, "").await);
+    }
+    let refused = connect_async(format!("ws://{address}/api/v1/stream")).await;
+    assert!(matches!(refused, Err(Error::Http(response)) if response.status() == 503));
+    drop(sockets.pop());
+    for attempt in 0.. {
+        if connect_async(format!("ws://{address}/api/v1/stream")).await.is_ok() {
+            break;
+        }
+        assert!(attempt < 200, "the place never became free");
+        crate::clock::wall_sleep(Duration::from_millis(10)).await;
+    }
+}
