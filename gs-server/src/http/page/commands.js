@@ -22,10 +22,15 @@ function row(command) {
   if (!GOING.includes(command.stage)) li.classList.add("over");
   li.append(make("span", "id", `#${command.id}`));
   const args = Object.entries(command.arguments).map(([name, value]) => `${name} ${JSON.stringify(value)}`).join(", ");
-  const what = make("span", "what", args ? `${command.command} ${args}` : command.command);
+  const what = make("span", "what", `${command.command} ${short(command.arguments) ?? args}`.trim());
   what.title = `${command.command} ${args}\nby ${command.principal}, attempt ${command.attempt} of ${command.attempts_allowed}`;
   li.append(what, lights(command), make("span", BAD.includes(command.stage) ? "word bad" : "word", command.stage));
   return li;
+}
+
+/** A range of chunks as operators say it. */
+function short({ first, count }) {
+  return first === undefined || count === undefined ? null : `${first} – ${first + count - 1}`;
 }
 
 function lights(command) {

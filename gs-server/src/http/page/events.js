@@ -14,7 +14,7 @@ export function addEvent(event) {
 }
 
 function row(event) {
-  const li = make("li", `level-row`);
+  const li = make("li", event.kind === "frame-heard" ? "quiet" : "");
   const mark = make("span", `mark level-${event.level}`, MARKS[event.level] ?? "·");
   mark.title = event.level;
   const time = make("span", "time", clock(ms(event.at)));

@@ -47,17 +47,13 @@ function paintValues() {
     if (items.length === 0) continue;
     const tr = make("tr", row.fold ? "fold" : "");
     tr.append(make("td", "name", row.name));
-    const texts = items.map(({ value }) => {
-      if (value === null) return "invalid";
-      return row.show ? row.show(value) : number(value * (row.scale ?? 1), row.digits);
-    });
     const cell = make("td", "value");
     const perLine = row.per ?? 3;
-    for (let i = 0; i < texts.length; i += perLine) {
-      if (i > 0) cell.append(make("br"));
-      cell.append(texts.slice(i, i + perLine).join("  "));
-    }
-    if (items.some((item) => item.value === null)) cell.classList.add("invalid");
+    items.forEach(({ value }, i) => {
+      if (i > 0) cell.append(i % perLine === 0 ? make("br") : "  ");
+      if (value === null) cell.append(make("span", "invalid", "invalid"));
+      else cell.append(row.show ? row.show(value) : number(value * (row.scale ?? 1), row.digits));
+    });
     cell.title = items.map((item) => item.parameter).join(", ");
     tr.append(cell, make("td", "unit", row.unit ?? items[0].unit));
     body.append(tr);

@@ -54,7 +54,7 @@ async function load(image, version) {
   shown = version;
 }
 
-const COLOURS = { "#": "--text", "!": "--distress", ".": "--raised" };
+const COLOURS = { "#": "--text", "!": "--distress", ".": "--faint" };
 
 export function paintGrid() {
   const canvas = byId("chunks");
@@ -79,8 +79,10 @@ export function paintGrid() {
   for (let i = 0; i < map.length; i += 1) {
     const x = (i % columns) * cell;
     const y = Math.floor(i / columns) * cell;
-    pen.fillStyle = style.getPropertyValue(COLOURS[map[i]] ?? "--raised");
-    pen.fillRect(x, y, cell - gap, cell - gap);
+    pen.fillStyle = pen.strokeStyle = style.getPropertyValue(COLOURS[map[i]] ?? "--faint");
+    // Held is filled, missing is a frame; where cells are too small for that, missing is left dark.
+    if (map[i] !== ".") pen.fillRect(x, y, cell - gap, cell - gap);
+    else if (cell > 4) pen.strokeRect(x + 0.5, y + 0.5, cell - gap - 1, cell - gap - 1);
     // A conflict differs in shape as well as in colour.
     if (map[i] === "!" && cell > 4) pen.clearRect(x + cell / 3, y + cell / 3, cell / 3, cell / 3);
   }
