@@ -22,6 +22,7 @@ pub struct IntentEnvelope {
 }
 
 /// What an operator may want.
+#[expect(clippy::large_enum_variant, reason = "people are slow: a few at a time exist")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Intent {
     /// Send a telecommand.

@@ -10,6 +10,7 @@ use crate::intent::{Accepted, IntentEnvelope, Refusal};
 use crate::record::{Batch, Route, Source};
 
 /// What the world tells the engine.
+#[expect(clippy::large_enum_variant, reason = "an input lives for one call")]
 #[derive(Debug)]
 pub enum Input<'a> {
     /// Bytes that a radio delivered, in any pieces.

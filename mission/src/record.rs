@@ -37,6 +37,7 @@ pub struct Route {
 }
 
 /// One row to be.
+#[expect(clippy::large_enum_variant, reason = "a batch holds a few dozen for a few milliseconds")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
     /// A raw frame, for ever. The same id again changes `nested` alone: what lay inside a candidate that turned out

@@ -63,6 +63,8 @@ pub struct CommandSnapshot {
     pub stage_at: UtcUs,
     /// The last attempt.
     pub attempt: u16,
+    /// When it last reached `radiating` or `radiated`; `None` if it never did.
+    pub on_air_at: Option<UtcUs>,
     /// The newest sealed frame of it: counter, tag, the 240 bytes.
     pub sealed: Option<SealedSnapshot>,
 }

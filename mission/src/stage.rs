@@ -69,15 +69,18 @@ impl Stage {
     /// `idempotent` commands may return to the queue after an attempt whose outcome is not known; the others never.
     pub const fn may_be_followed_by(self, next: Self, idempotent: bool) -> bool {
         match self {
-            // An idempotent command that waits to be repeated may still be answered for its earlier attempt.
+            // An idempotent command that waits to be repeated may still be answered for its earlier attempt; and when
+            // it is withdrawn or out of time, whether that attempt was obeyed is unknown.
             Self::Queued => {
                 matches!(next, Self::Sealed | Self::Expired | Self::Cancelled | Self::Failed)
-                    || (idempotent && matches!(next, Self::Answered | Self::Rejected))
+                    || (idempotent && matches!(next, Self::Answered | Self::Rejected | Self::Unknown))
             }
-            Self::Sealed => matches!(
-                next,
-                Self::Radiating | Self::Expired | Self::Cancelled | Self::Failed | Self::Queued
-            ),
+            Self::Sealed => {
+                matches!(
+                    next,
+                    Self::Radiating | Self::Expired | Self::Cancelled | Self::Failed | Self::Queued
+                ) || (idempotent && matches!(next, Self::Unknown))
+            }
             // Back to the queue only when the radio is certain that nothing left the antenna.
             Self::Radiating => matches!(
                 next,

@@ -175,12 +175,9 @@ impl Station {
         let s = found.ok_or(Refusal::UnknownCommand(id))?;
         let sat = &mut self.satellites[s];
         let command = sat.commands.get(&id).ok_or(Refusal::UnknownCommand(id))?;
-        let (stage, attempt) = (command.stage, command.attempt);
+        let stage = command.stage;
         let too_late = Refusal::TooLate { command: id, stage: stage.name() };
         match stage {
-            Stage::Queued if attempt > 0 && !command.record.telecommand.is_idempotent() => {
-                return Err(too_late);
-            }
             Stage::Queued => {}
             Stage::Sealed => {
                 // In preparation: the bytes have not been handed over, and now they never are.
@@ -196,7 +193,7 @@ impl Station {
             _ => return Err(too_late),
         }
         self.audit(now.utc, who, "command.cancel", format!("command {id}"));
-        self.stage_by(now, s, id, Stage::Cancelled, who, &format!("{who} withdrew it"), None);
+        self.give_up(now, s, id, Stage::Cancelled, who, &format!("{who} withdrew it"));
         Ok(Accepted::Cancelled(id))
     }
 

@@ -14,6 +14,8 @@ use crate::stage::Stage;
 const UNKNOWN_KEPT_US: i64 = 24 * 3_600 * 1_000_000;
 /// Slack when uptime is held against the clock.
 const UPTIME_SLACK_US: i64 = 2_000_000;
+/// A satellite that obeys a Reset has booted within this time.
+const BOOT_WITHIN_US: i64 = 20_000_000;
 /// An idempotent command that nobody answered waits this long before it is repeated.
 const REPEAT_AFTER_US: u64 = 1_000_000;
 
@@ -119,8 +121,28 @@ impl Station {
         if let Some(at) = next {
             sat.wake_at(mono_of(now, UtcUs(at)));
         }
+        let me = self.me.clone();
         for id in expired {
-            self.stage(now, s, id, Stage::Expired, "its time ran out before it could be radiated", None);
+            self.give_up(now, s, id, Stage::Expired, &me, "its time ran out before it could be radiated");
+        }
+    }
+
+    /// It will not be radiated any more: `stage` if it never was, unknown if an earlier attempt may have been obeyed.
+    pub(super) fn give_up(
+        &mut self,
+        now: Now,
+        s: usize,
+        id: CommandId,
+        stage: Stage,
+        who: &Principal,
+        why: &str,
+    ) {
+        let Some(command) = self.satellites[s].commands.get(&id) else { return };
+        if command.on_air_at.is_some() {
+            let why = format!("{why}; an earlier attempt may have been obeyed");
+            self.stage_by(now, s, id, Stage::Unknown, who, &why, None);
+        } else {
+            self.stage_by(now, s, id, stage, who, why, None);
         }
     }
 
@@ -157,16 +179,19 @@ impl Station {
                         i64::from(before) + (now.0 - at.0) / 1_000 + UPTIME_SLACK_US / 1_000
                             > i64::from(u32::MAX)
                     });
+                    // How long after the radiation the satellite booted; negative: it has run since before.
+                    let booted_after_us = since_us - uptime_us;
                     if wraps {
                         // The 49.7-day wrap looks like a reset: it proves nothing.
-                    } else if uptime_us < since_us + UPTIME_SLACK_US {
-                        let why = format!("the heartbeat shows an uptime of {} s", uptime_ms / 1_000);
-                        proofs.push((command.record.id, Stage::Answered, why));
-                    } else {
+                    } else if booted_after_us < -UPTIME_SLACK_US {
                         let why =
                             format!("the heartbeat shows an uptime of {} s: no reset", uptime_ms / 1_000);
                         proofs.push((command.record.id, Stage::Failed, why));
+                    } else if booted_after_us < BOOT_WITHIN_US {
+                        let why = format!("the heartbeat shows an uptime of {} s", uptime_ms / 1_000);
+                        proofs.push((command.record.id, Stage::Answered, why));
                     }
+                    // Booted much later: another reset did that, and has wiped out what this one may have done.
                 }
                 Telecommand::SetTransmitter { on: false } if since_us > 2 * UPTIME_SLACK_US => {
                     let why = "a heartbeat was heard after it: the satellite still transmits".to_owned();

@@ -6,7 +6,7 @@ use protocol::{
 
 use super::image::{Assembly, Fit, is_usable};
 use super::intake::Heard;
-use super::satellite::Exchange;
+use super::satellite::{Command, Exchange};
 use super::{About, Station};
 use crate::id::{CommandId, ImageId};
 use crate::level::Level;
@@ -14,6 +14,9 @@ use crate::record::{
     ChunkRecord, DownloadState, EventKind, ImageRecord, LimitRecord, Point, Record, Subject,
 };
 use crate::stage::Stage;
+
+/// A tag means an old request for this long; then it may have been used again (255 requests take 10 minutes).
+const LATE_ANSWER_US: i64 = 300_000_000;
 
 impl Station {
     /// A frame of the satellite was received just now, whatever is in it.
@@ -81,7 +84,9 @@ impl Station {
             let tag = heard.tag.filter(|_| sat.profile.tags)?;
             let unknown =
                 sat.commands.values().rev().filter(|c| c.stage == Stage::Unknown || c.stage == Stage::Queued);
+            let lately = |c: &&Command| c.on_air_at.is_some_and(|at| heard.at.utc.0 - at.0 < LATE_ANSWER_US);
             unknown
+                .filter(lately)
                 .filter(|c| c.tag == Some(tag) && expected(c.record.telecommand.answer(), tag))
                 .map(|c| c.record.id)
                 .next()

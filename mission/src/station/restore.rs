@@ -124,14 +124,13 @@ fn satellite(
 }
 
 fn command(found: &CommandSnapshot) -> Command {
-    let was_on_air = matches!(found.stage, Stage::Radiating | Stage::Radiated | Stage::Unknown);
     Command {
         record: found.record.clone(),
         stage: found.stage,
         stage_at: found.stage_at,
         attempt: found.attempt,
         tag: found.sealed.as_ref().map(|sealed| sealed.tag),
-        on_air_at: was_on_air.then_some(found.stage_at),
+        on_air_at: found.on_air_at,
         sealed: found.sealed.clone().filter(|_| found.stage == Stage::Sealed),
         not_before: MonoUs(0),
     }

@@ -9,9 +9,10 @@ use std::sync::Arc;
 use protocol::{Answer, Counter, KeyId, Nonce, RequestTag, Telecommand, UP_PLAINTEXT_LEN, down_type, seal};
 
 use super::gate::{Need, Wait};
+use super::outcome::mono_of;
 use super::satellite::{Awaited, Exchange, Prepared, Settling, Step, chunks_asked};
 use super::{About, Station};
-use crate::clock::Now;
+use crate::clock::{MonoUs, Now};
 use crate::id::{CommandId, TxId};
 use crate::level::Level;
 use crate::port::{Effect, LinkState, MaybeRadiated, Transmit};
@@ -28,6 +29,8 @@ const CAPTURE_US: u64 = 15_000_000;
 const HOLD_US: u64 = 20_000_000;
 /// Telemetry has so many heartbeat periods to tell an outcome.
 const SETTLE_PERIODS: u64 = 3;
+/// Two Resets are this far apart, in microseconds.
+const RESETS_APART_US: i64 = 60_000_000;
 /// After the radio refused a frame, nothing is tried for this long.
 const REFUSED_US: u64 = 2_000_000;
 
@@ -128,6 +131,9 @@ impl Station {
                 until: Some(command.not_before),
             });
         }
+        if let Some(until) = self.other_reset_until(now, s, id) {
+            return Err(Wait { why: "an earlier Reset is not settled yet".into(), until: Some(until) });
+        }
         let need =
             Need { gate: command.record.gate, answer_us: self.answer_us(s, l, &command.record.telecommand) };
         self.gate(now, s, l, need)?;
@@ -148,6 +154,18 @@ impl Station {
             }
             None => self.seal(now, s, l, id),
         }
+    }
+
+    /// Two Resets shortly after each other could not be told apart by telemetry: the second waits until then.
+    fn other_reset_until(&self, now: Now, s: usize, id: CommandId) -> Option<MonoUs> {
+        let commands = &self.satellites[s].commands;
+        if commands.get(&id)?.record.telecommand != Telecommand::Reset {
+            return None;
+        }
+        let others =
+            commands.values().filter(|c| c.record.id != id && c.record.telecommand == Telecommand::Reset);
+        let until = others.filter_map(|c| c.on_air_at).map(|at| at.plus(RESETS_APART_US)).max()?;
+        (until > now.utc).then(|| mono_of(now, until))
     }
 
     fn seal(&mut self, now: Now, s: usize, l: usize, id: CommandId) -> Result<(), Wait> {
@@ -392,8 +410,7 @@ impl Station {
                 self.satellites[s].exchange = Exchange::Idle;
             }
             Answer::One(_) if answer_us > HOLD_US && sat.profile.tags => {
-                let busy =
-                    (crate::clock::MonoUs(expected.0.saturating_sub(3_000_000)), expected.plus(margin_us));
+                let busy = (MonoUs(expected.0.saturating_sub(3_000_000)), expected.plus(margin_us));
                 let waiting = settling(Some(busy), expected.plus(margin_us));
                 self.satellites[s].settling.push(waiting);
                 self.satellites[s].exchange = Exchange::Idle;

@@ -1,0 +1,83 @@
+//! What kind of world.
+
+use satellite::{ChannelConfig, PassProfile};
+
+/// A world by its seed.
+#[derive(Debug, Clone)]
+pub struct WorldConfig {
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// The air: losses, flips, bursts, passes. Its seed is set from `seed`.
+    pub channel: ChannelConfig,
+    /// Size of the satellite's images in bytes.
+    pub image_bytes: u32,
+    /// A real picture instead of a pattern (slow to make).
+    pub real_picture: bool,
+    /// The satellite knows GetImageRanges, and ground uses it.
+    pub ranges: bool,
+    /// Answers carry tags.
+    pub tags: bool,
+    /// Ground is told when the satellite comes into view, and when it will be lost.
+    pub view_is_known: bool,
+    /// What people do.
+    pub operator: Operator,
+    /// What goes wrong on the ground.
+    pub chaos: Chaos,
+}
+
+/// What people do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operator {
+    /// Nothing at all.
+    Absent,
+    /// Order the image once.
+    WantsImage,
+    /// Order images, take pictures, send every kind of command at random moments, cancel some.
+    Busy,
+}
+
+/// What goes wrong on the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Chaos {
+    /// Mean seconds between two kills while the satellite is in view; `None` for no kills.
+    pub kill_every_s: Option<f64>,
+    /// Chance that a batch cannot be stored.
+    pub persist_fails: f64,
+    /// Chance that the witness cannot be raised.
+    pub witness_fails: f64,
+    /// Mean seconds between two losses of the port while the satellite is in view.
+    pub unplug_every_s: Option<f64>,
+}
+
+impl WorldConfig {
+    /// A satellite that is always in view over a clean channel, and an operator who wants its image.
+    pub fn seeded(seed: u64) -> Self {
+        Self {
+            seed,
+            channel: ChannelConfig::perfect(),
+            image_bytes: 12_000,
+            real_picture: false,
+            ranges: false,
+            tags: true,
+            view_is_known: false,
+            operator: Operator::WantsImage,
+            chaos: Chaos::default(),
+        }
+    }
+
+    /// The same with losses and flips on the air.
+    #[must_use]
+    pub fn lossy(mut self, loss: f64, flips: f64) -> Self {
+        self.channel.loss = loss;
+        self.channel.flips = flips;
+        self
+    }
+
+    /// The same with the passes of an orbit instead of a satellite that stands still.
+    #[must_use]
+    pub fn with_passes(mut self) -> Self {
+        self.channel.passes = PassProfile::default();
+        self.channel.elevation_loss = true;
+        self
+    }
+}
