@@ -40,6 +40,9 @@ const ENGINE_END: Duration = Duration::from_millis(900);
 /// What closing the archive may take.
 const STORE_END: Duration = Duration::from_millis(400);
 
+/// Puts a new log filter into force.
+pub type SetLogFilter = Box<dyn Fn(&str) + Send + Sync>;
+
 /// What a caller may bring along. [`RunOptions::new`] brings what `serve` needs.
 pub struct RunOptions {
     /// The configuration; checked by [`run_with`].
@@ -57,7 +60,7 @@ pub struct RunOptions {
     /// Changed configurations (SIGHUP): what can be applied is, what needs a restart is named in the log.
     pub reload: Option<mpsc::Receiver<Config>>,
     /// Called with the new log filter when a reload brings one.
-    pub set_log_filter: Option<Box<dyn Fn(&str) + Send + Sync>>,
+    pub set_log_filter: Option<SetLogFilter>,
     /// Facts of a demo for the page and the API.
     pub demo: Option<serde_json::Value>,
 }
@@ -174,7 +177,8 @@ pub async fn run_with(
     listener: TcpListener,
     stop: CancellationToken,
 ) -> Result<Report, RunError> {
-    let RunOptions { config, timer, store, entropy, mut wires, ready, reload, set_log_filter, demo } = options;
+    let RunOptions { config, timer, store, entropy, mut wires, ready, reload, set_log_filter, demo } =
+        options;
     config.check()?;
     no_core_dumps();
     tracing::info!("configuration:\n{config}");
@@ -185,7 +189,9 @@ pub async fn run_with(
     // A stepped clock stands still until all actors run.
     let starting = timer.busy("start of the server");
     let store = open_store(&config, store).await?;
-    let address = listener.local_addr().map_err(|source| RunError::Io { what: "the listener has no address", source })?;
+    let address = listener
+        .local_addr()
+        .map_err(|source| RunError::Io { what: "the listener has no address", source })?;
     // After the archive: the token file may lie in its folder, which is made with it.
     let token = Token::load_or_create(&config.token_file())?;
     let snapshot = snapshot(&store, &station).await?;
@@ -353,7 +359,8 @@ async fn open_store(config: &Config, brought: Option<Store>) -> Result<Store, Ru
 fn snapshot(store: &Store, station: &StationConfig) -> BoxFuture<'static, Result<Snapshot, StoreError>> {
     let store = store.clone();
     let satellites: Vec<_> = station.satellites.iter().map(|satellite| satellite.id.clone()).collect();
-    let keys: Vec<_> = station.satellites.iter().filter_map(|satellite| satellite.key.as_ref().map(Key::id)).collect();
+    let keys: Vec<_> =
+        station.satellites.iter().filter_map(|satellite| satellite.key.as_ref().map(Key::id)).collect();
     async move { store.snapshot(&satellites, &keys).await }.boxed()
 }
 
@@ -362,7 +369,7 @@ async fn reloads(
     mut config: Config,
     mut reload: mpsc::Receiver<Config>,
     engine: EngineHandle,
-    set_log_filter: Option<Box<dyn Fn(&str) + Send + Sync>>,
+    set_log_filter: Option<SetLogFilter>,
     stop: CancellationToken,
 ) {
     let mut number = 0_u64;
@@ -392,8 +399,12 @@ async fn reloads(
             let key = format!("reload-{}-{number}", uuid::Uuid::new_v4());
             let intent = Intent::ArmLink { link, armed: *armed };
             match engine.intent(Principal::new("configuration"), key, [0; 32], intent).await {
-                Ok(_) => tracing::info!(link = %name, armed, "reload: link {name} is {}", if *armed { "armed" } else { "not armed any more" }),
-                Err(error) => tracing::error!(link = %name, "reload: link {name} cannot be armed or disarmed: {error}"),
+                Ok(_) => {
+                    tracing::info!(link = %name, armed, "reload: link {name} is {}", if *armed { "armed" } else { "not armed any more" })
+                }
+                Err(error) => {
+                    tracing::error!(link = %name, "reload: link {name} cannot be armed or disarmed: {error}")
+                }
             }
         }
         for key in &changes.need_restart {

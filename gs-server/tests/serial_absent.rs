@@ -1,4 +1,5 @@
 //! What a missing port costs: alone in its process, so that the figure is the server's.
+#![expect(clippy::expect_used, reason = "a test that cannot be set up has failed")]
 
 #[expect(dead_code, reason = "shared with the tests in run")]
 #[path = "run/support.rs"]
@@ -13,7 +14,8 @@ use support::{Folder, Server, pause, wall};
 fn cpu() -> Duration {
     let stat = std::fs::read_to_string("/proc/self/stat").expect("procfs");
     let after_name = stat.rsplit_once(')').expect("a name in brackets").1;
-    let fields: Vec<u64> = after_name.split_whitespace().skip(11).take(2).map(|f| f.parse().expect("a number")).collect();
+    let fields: Vec<u64> =
+        after_name.split_whitespace().skip(11).take(2).map(|f| f.parse().expect("a number")).collect();
     Duration::from_millis(10 * fields.iter().sum::<u64>())
 }
 

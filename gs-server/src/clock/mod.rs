@@ -45,8 +45,8 @@ mod stepped;
 mod system;
 mod wall;
 
-pub(crate) use kernel::kernel_says_synchronised;
 pub use gauge::{ByteGauge, Wire};
+pub(crate) use kernel::kernel_says_synchronised;
 pub use stepped::{SteppedClock, SteppedOptions};
 pub use system::{ScaledClock, SystemClock};
 pub(crate) use wall::{wall_sleep, within};

@@ -187,7 +187,8 @@ impl Shared {
             state.hold("woken sleeper");
             drop(state);
             // Outside the lock: a token that nobody takes is dropped here, and dropping takes the lock.
-            let _ = sleeper.wake.send(BusyToken::counted(Arc::clone(&self) as Arc<dyn Holds>, "woken sleeper"));
+            let _ =
+                sleeper.wake.send(BusyToken::counted(Arc::clone(&self) as Arc<dyn Holds>, "woken sleeper"));
             state = self.lock();
         }
     }
@@ -203,7 +204,7 @@ impl State {
     #[expect(clippy::cast_precision_loss, reason = "microseconds stay far below 2^53 for 285 years")]
     fn wait_for(&mut self, at_us: u64) -> Option<Duration> {
         let wall = wall_now();
-        let Some(speed) = self.speed else { return None };
+        let speed = self.speed?;
         if at_us <= self.skip_until_us {
             self.anchor = (wall, at_us);
             return None;
@@ -213,7 +214,8 @@ impl State {
             self.anchor = (wall, self.skip_until_us);
         }
         let (anchor_wall, anchor_us) = self.anchor;
-        let planned = anchor_wall + Duration::from_secs_f64(at_us.saturating_sub(anchor_us) as f64 / speed / 1e6);
+        let planned =
+            anchor_wall + Duration::from_secs_f64(at_us.saturating_sub(anchor_us) as f64 / speed / 1e6);
         if planned > wall {
             return Some(planned - wall);
         }

@@ -41,7 +41,10 @@ fn utc_us() -> i64 {
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "this is the one place that sets a timer on the machine's clock")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "this is the one place that sets a timer on the machine's clock"
+)]
 async fn until(origin: Instant, us: u64) {
     // A wait beyond what the timer wheel can express is a wait for ever.
     match origin.checked_add(Duration::from_micros(us)) {
@@ -98,7 +101,12 @@ impl ScaledClock {
 }
 
 impl Clock for ScaledClock {
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "microseconds stay far below 2^53 for 285 years; the product is not negative and saturates")]
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "microseconds stay far below 2^53 for 285 years; the product is not negative and saturates"
+    )]
     fn now(&self) -> Now {
         let us = (elapsed_us(self.origin) as f64 * self.speed) as u64;
         Now { mono: MonoUs(us), utc: self.utc_at_origin.plus(i64::try_from(us).unwrap_or(i64::MAX)) }
@@ -110,7 +118,12 @@ impl Clock for ScaledClock {
 }
 
 impl Timer for ScaledClock {
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "microseconds stay far below 2^53 for 285 years; the quotient is not negative and saturates")]
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "microseconds stay far below 2^53 for 285 years; the quotient is not negative and saturates"
+    )]
     fn sleep_until(&self, at: MonoUs) -> BoxFuture<'static, BusyToken> {
         // Rounded up, so that the clock shows `at` or later when the sleeper wakes.
         let wall_us = (at.0 as f64 / self.speed).ceil() as u64 + 1;

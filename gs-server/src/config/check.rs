@@ -32,27 +32,47 @@ impl Config {
         name("station.name".into(), StationId::new(&self.station.name).map(drop))?;
         ensure(!self.satellites.is_empty(), "satellites", "there is none", "Add a [[satellites]] section.")?;
         ensure(!self.links.is_empty(), "links", "there is none", "Add a [[links]] section.")?;
-        ensure(self.satellites.len() <= MOST, "satellites", format!("there are {}", self.satellites.len()), "16 fit.")?;
+        ensure(
+            self.satellites.len() <= MOST,
+            "satellites",
+            format!("there are {}", self.satellites.len()),
+            "16 fit.",
+        )?;
         ensure(self.links.len() <= MOST, "links", format!("there are {}", self.links.len()), "16 fit.")?;
         let mut names = BTreeSet::new();
         for (at, satellite) in self.satellites.iter().enumerate() {
             let key = format!("satellites[{at}]");
             satellite.check(&key)?;
-            ensure(names.insert(&satellite.name), format!("{key}.name"), format!("'{}' is there twice", satellite.name), "Names are unique.")?;
+            ensure(
+                names.insert(&satellite.name),
+                format!("{key}.name"),
+                format!("'{}' is there twice", satellite.name),
+                "Names are unique.",
+            )?;
         }
         let mut links = BTreeSet::new();
         let mut ends = BTreeSet::new();
         for (at, link) in self.links.iter().enumerate() {
             let key = format!("links[{at}]");
             link.check(&key)?;
-            ensure(links.insert(&link.name), format!("{key}.name"), format!("'{}' is there twice", link.name), "Names are unique.")?;
+            ensure(
+                links.insert(&link.name),
+                format!("{key}.name"),
+                format!("'{}' is there twice", link.name),
+                "Names are unique.",
+            )?;
             ensure(
                 names.contains(&link.satellite),
                 format!("{key}.satellite"),
                 format!("'{}' is not among the satellites", link.satellite),
                 "Give the name of a [[satellites]] section.",
             )?;
-            ensure(ends.insert(link.far_end()), key, format!("'{}' is used by two links", link.far_end()), "One link owns its port.")?;
+            ensure(
+                ends.insert(link.far_end()),
+                key,
+                format!("'{}' is used by two links", link.far_end()),
+                "One link owns its port.",
+            )?;
         }
         self.check_rssi()?;
         self.check_storage()?;
@@ -62,7 +82,8 @@ impl Config {
     /// The frame decoder is made once for a satellite, so its links must agree.
     fn check_rssi(&self) -> Checked {
         for satellite in &self.satellites {
-            let mut of_links = self.links.iter().filter(|l| l.satellite == satellite.name).map(|l| l.rssi.unwrap_or(true));
+            let mut of_links =
+                self.links.iter().filter(|l| l.satellite == satellite.name).map(|l| l.rssi.unwrap_or(true));
             if let Some(first) = of_links.next() {
                 ensure(
                     of_links.all(|other| other == first),
@@ -90,7 +111,11 @@ impl Config {
             ensure(
                 link.simulated == simulated,
                 format!("links[{at}].simulated"),
-                format!("link '{}' is {}, another is not", link.name, if link.simulated { "simulated" } else { "real" }),
+                format!(
+                    "link '{}' is {}, another is not",
+                    link.name,
+                    if link.simulated { "simulated" } else { "real" }
+                ),
                 "Simulated and real links never share a server: use two configurations with two data folders.",
             )?;
         }
@@ -147,9 +172,13 @@ impl LimitSection {
         for (side, thresholds) in [("below", &self.below), ("above", &self.above)] {
             for (level, value) in thresholds {
                 let key = format!("{key}.{side}.{level}");
-                let parsed: Level = level
-                    .parse()
-                    .map_err(|_| ConfigError::value(&key, "no such level", "Use watch, warning, distress, critical or severe."))?;
+                let parsed: Level = level.parse().map_err(|_| {
+                    ConfigError::value(
+                        &key,
+                        "no such level",
+                        "Use watch, warning, distress, critical or severe.",
+                    )
+                })?;
                 ensure(parsed != Level::Normal, &key, "'normal' needs no limit", "Remove it.")?;
                 ensure(value.is_finite(), &key, format!("{value}"), "Give a number.")?;
             }
@@ -204,9 +233,9 @@ impl LinkSection {
             format!("{} ms", self.turn_round_ms),
             "Give at most 60000.",
         )?;
-        driver_config(self)
-            .check()
-            .map_err(|error| ConfigError::value(key, error.to_string(), "See docs/configuration.md, section links."))
+        driver_config(self).check().map_err(|error| {
+            ConfigError::value(key, error.to_string(), "See docs/configuration.md, section links.")
+        })
     }
 
     /// Exactly what the kind needs is there, and nothing else.
@@ -226,7 +255,10 @@ impl LinkSection {
             )?;
         }
         let (field, remedy) = match self.kind {
-            LinkKind::Serial => ("port", "Give port = \"/dev/ttyUSB0\" or usb = { vid = …, pid = … }; `gs-server radio list` shows what there is."),
+            LinkKind::Serial => (
+                "port",
+                "Give port = \"/dev/ttyUSB0\" or usb = { vid = …, pid = … }; `gs-server radio list` shows what there is.",
+            ),
             LinkKind::Tcp => ("connect", "Give connect = \"host:port\"."),
             LinkKind::Replay => ("file", "Give file = \"recording.bin\"."),
         };

@@ -21,7 +21,9 @@ impl Environment {
         let listen = text("GS_LISTEN").and_then(|value| {
             value
                 .parse()
-                .inspect_err(|_| tracing::warn!(%value, "GS_LISTEN={value} is no address and port; it is ignored"))
+                .inspect_err(
+                    |_| tracing::warn!(%value, "GS_LISTEN={value} is no address and port; it is ignored"),
+                )
                 .ok()
         });
         Self { listen, data: text("GS_DATA").map(PathBuf::from), log: text("GS_LOG") }

@@ -45,7 +45,11 @@ impl ConfigError {
         }
     }
 
-    pub(crate) fn value(key: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+    pub(crate) fn value(
+        key: impl Into<String>,
+        problem: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
         Self::Value { key: key.into(), problem: problem.into(), remedy: remedy.into() }
     }
 }

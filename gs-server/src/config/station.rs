@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use mission::{
-    CounterRule, LimitRule, LinkConfig, LinkId, Profile, SatelliteConfig, SatelliteId, StationConfig, StationId,
+    CounterRule, LimitRule, LinkConfig, LinkId, Profile, SatelliteConfig, SatelliteId, StationConfig,
+    StationId,
 };
 use protocol::Key;
 use radio::airtime::{LinkTiming, LoraPhy};
@@ -56,7 +57,8 @@ pub fn station_config(config: &Config, keys: &BTreeMap<String, Key>) -> Result<S
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked: 1 to 86,400 seconds")]
 fn profile(config: &Config, satellite: &SatelliteSection) -> Profile {
-    let rssi = config.links.iter().find(|l| l.satellite == satellite.name).and_then(|l| l.rssi).unwrap_or(true);
+    let rssi =
+        config.links.iter().find(|l| l.satellite == satellite.name).and_then(|l| l.rssi).unwrap_or(true);
     Profile {
         address: satellite.address,
         tags: satellite.tags,

@@ -54,7 +54,13 @@ impl fmt::Display for Config {
                 None => "no limit on its size".to_owned(),
             },
         )?;
-        write!(f, "http {}: hosts {:?}, token in {}", self.http.listen, self.http.allowed_hosts, self.token_file().display())?;
+        write!(
+            f,
+            "http {}: hosts {:?}, token in {}",
+            self.http.listen,
+            self.http.allowed_hosts,
+            self.token_file().display()
+        )?;
         if let Some(simulation) = &self.simulation {
             write!(f, "\nsimulation: {} times life", simulation.speed)?;
         }

@@ -83,15 +83,24 @@ fn simulated_and_real_links_never_mix() {
 #[test]
 fn a_link_needs_what_its_kind_says() {
     assert!(refused(&SMALL.replace("port = \"/dev/ttyUSB0\"", "")).contains("radio list"));
-    let tcp = SMALL.replace("kind = \"serial\"\nport = \"/dev/ttyUSB0\"", "kind = \"tcp\"\nconnect = \"h:1\"\naux = \"cts\"");
+    let tcp = SMALL.replace(
+        "kind = \"serial\"\nport = \"/dev/ttyUSB0\"",
+        "kind = \"tcp\"\nconnect = \"h:1\"\naux = \"cts\"",
+    );
     assert!(refused(&tcp).contains("modem lines"));
-    assert!(refused(&SMALL.replace("satellite = \"pixelsat-1\"", "satellite = \"other\"")).contains("'other'"));
+    assert!(
+        refused(&SMALL.replace("satellite = \"pixelsat-1\"", "satellite = \"other\"")).contains("'other'")
+    );
 }
 
 #[test]
 fn the_environment_goes_over_the_file() {
     let mut config = parse(SMALL).unwrap();
-    config.apply(&Environment { listen: "0.0.0.0:1".parse().ok(), data: Some("/x".into()), log: Some("debug".into()) });
+    config.apply(&Environment {
+        listen: "0.0.0.0:1".parse().ok(),
+        data: Some("/x".into()),
+        log: Some("debug".into()),
+    });
     assert_eq!(config.http.listen.port(), 1);
     assert_eq!(config.storage.folder, Path::new("/x"));
     assert_eq!(config.log.filter, "debug");
@@ -127,7 +136,9 @@ fn the_example_configurations_are_configurations() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "toml") {
             let text = std::fs::read_to_string(&path).unwrap();
-            Config::from_toml(&text, &folder).and_then(|c| c.check()).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+            Config::from_toml(&text, &folder)
+                .and_then(|c| c.check())
+                .unwrap_or_else(|e| panic!("{}: {e}", path.display()));
             seen += 1;
         }
     }

@@ -207,14 +207,17 @@ impl Engine {
                 tracing::error!(batch = batch.0, "storage takes nothing: {reason}");
                 self.handle(Input::PersistFailed { batch, reason: &reason });
             }
-            Outcome::Witness { key, counter, result: Ok(()) } => self.handle(Input::WitnessDone { key, counter }),
+            Outcome::Witness { key, counter, result: Ok(()) } => {
+                self.handle(Input::WitnessDone { key, counter })
+            }
             Outcome::Witness { key, result: Err(error), .. } => {
                 let reason = whole(&error);
                 tracing::error!(%key, "the witness of key {key} cannot be raised: {reason}");
                 self.handle(Input::WitnessFailed { key, reason: &reason });
             }
             Outcome::LookedUp { intent, result } => {
-                let found = result.map_err(|error| tracing::error!("an intent cannot be looked up: {}", whole(&error)));
+                let found = result
+                    .map_err(|error| tracing::error!("an intent cannot be looked up: {}", whole(&error)));
                 if let Some(envelope) = self.intents.looked_up(intent, found) {
                     self.handle(Input::Intent(envelope));
                 }

@@ -36,18 +36,16 @@ pub(super) struct Background {
 }
 
 impl Background {
-    pub(super) fn start(
-        &mut self,
-        busy: BusyToken,
-        work: impl Future<Output = Outcome> + Send + 'static,
-    ) {
+    pub(super) fn start(&mut self, busy: BusyToken, work: impl Future<Output = Outcome> + Send + 'static) {
         self.tasks.spawn(async move { (work.await, busy) });
     }
 
     /// Reserve work is done in its order, one after the other.
     pub(super) fn queue_reserve(&mut self, work: ReserveWork) {
         if self.reserve.len() >= RESERVE_QUEUE {
-            tracing::error!("the disk takes neither records nor the reserve: a raw frame is held in memory only");
+            tracing::error!(
+                "the disk takes neither records nor the reserve: a raw frame is held in memory only"
+            );
             return;
         }
         self.reserve.push_back(work);

@@ -60,7 +60,8 @@ impl Intents {
         let id = IntentId(self.last);
         self.by_key.insert(key.clone(), id);
         let (principal, idempotency_key) = key.clone();
-        self.under_way.insert(id, UnderWay { key, digest, intent: Some(intent), answers: vec![answer], busy });
+        self.under_way
+            .insert(id, UnderWay { key, digest, intent: Some(intent), answers: vec![answer], busy });
         Some((id, principal, idempotency_key))
     }
 
@@ -84,7 +85,11 @@ impl Intents {
             }
             Ok(Some(stored)) => {
                 let same = self.under_way.get(&id).is_some_and(|this| this.digest == stored.digest);
-                if same { Ok(Done { accepted: stored.accepted, replayed: true }) } else { Err(IntentError::KeyReused) }
+                if same {
+                    Ok(Done { accepted: stored.accepted, replayed: true })
+                } else {
+                    Err(IntentError::KeyReused)
+                }
             }
             Err(()) => Err(IntentError::Storage),
         };

@@ -98,7 +98,8 @@ impl<C: Connector> Link<C> {
         last_frame: &mut Option<std::pin::Pin<Box<dyn Future<Output = ()> + Send>>>,
     ) -> BusyToken {
         let driver_at = self.driver.next_wakeup_us().map(MonoUs);
-        let sleep = [driver_at, self.reopen_at].into_iter().flatten().min().map(|at| self.timer.sleep_until(at));
+        let sleep =
+            [driver_at, self.reopen_at].into_iter().flatten().min().map(|at| self.timer.sleep_until(at));
         drop(awake);
         let timer = Arc::clone(&self.timer);
         tokio::select! {
@@ -171,8 +172,11 @@ impl<C: Connector> Link<C> {
             self.refuse(transmit.tx, "the link is stopping").await;
             return;
         }
-        let input =
-            DriverInput::Transmit { id: transmit.tx.0, target: transmit.target_address, frame: &transmit.frame[..] };
+        let input = DriverInput::Transmit {
+            id: transmit.tx.0,
+            target: transmit.target_address,
+            frame: &transmit.frame[..],
+        };
         self.drive(input, None).await;
     }
 
@@ -344,7 +348,8 @@ impl<C: Connector> Link<C> {
                 self.show(LinkState::Failed { reason }).await;
             }
             DriverState::Opening if self.shown.is_none() => {
-                self.show(LinkState::Unavailable { reason: "the module is being brought up".to_owned() }).await;
+                self.show(LinkState::Unavailable { reason: "the module is being brought up".to_owned() })
+                    .await;
             }
             _ => {}
         }

@@ -1,8 +1,8 @@
 //! An open port, whatever it is made of: commands go in without waiting, events come out of a bounded queue.
 
 use mission::Now;
-use std::sync::Arc;
 use std::future::Future;
+use std::sync::Arc;
 
 use tokio::sync::mpsc;
 
@@ -65,17 +65,17 @@ impl PortContext {
     /// taken before they are counted as read.
     pub(crate) fn parcel(&self, event: PortEvent) -> (PortEvent, BusyToken) {
         let busy = self.timer.busy("bytes on their way to the link");
-        if let (PortEvent::Bytes { bytes, .. }, Some(gauge)) = (&event, self.to_host()) {
+        if let (PortEvent::Bytes { bytes, .. }, Some(gauge)) = (&event, self.gauge_to_host()) {
             gauge.read(bytes.len());
         }
         (event, busy)
     }
 
-    pub(crate) fn to_host(&self) -> Option<&ByteGauge> {
+    pub(crate) fn gauge_to_host(&self) -> Option<&ByteGauge> {
         self.wire.as_ref().map(|wire| &wire.to_host)
     }
 
-    pub(crate) fn from_host(&self) -> Option<&ByteGauge> {
+    pub(crate) fn gauge_from_host(&self) -> Option<&ByteGauge> {
         self.wire.as_ref().map(|wire| &wire.from_host)
     }
 }
@@ -85,7 +85,10 @@ pub(crate) trait Connector: Send + 'static {
     /// Tries once.
     ///
     /// `Err` is a sentence for the operator: what is not there, and what is.
-    fn connect(&self, context: PortContext) -> impl Future<Output = Result<Box<dyn Port>, String>> + Send + 'static;
+    fn connect(
+        &self,
+        context: PortContext,
+    ) -> impl Future<Output = Result<Box<dyn Port>, String>> + Send + 'static;
     /// Modem lines can be set.
     fn has_lines(&self) -> bool;
 }

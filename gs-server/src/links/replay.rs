@@ -26,7 +26,9 @@ pub(crate) async fn run(parts: LinkParts, stop: CancellationToken) {
                 }
                 let received = timer.now();
                 let bytes = piece.to_vec();
-                engine.send(EngineMessage::Bytes { link: id.clone(), bytes, source: Source::File, received }).await;
+                engine
+                    .send(EngineMessage::Bytes { link: id.clone(), bytes, source: Source::File, received })
+                    .await;
                 let _awake = timer.sleep_until(received.mono.plus(PAUSE_US)).await;
             }
             tracing::info!(link = %id, bytes = bytes.len(), "link {id}: {} was heard to its end", path.display());
@@ -49,7 +51,8 @@ pub(crate) async fn run(parts: LinkParts, stop: CancellationToken) {
 
 async fn read(path: &std::path::Path) -> Result<Vec<u8>, String> {
     let show = path.display();
-    let size = tokio::fs::metadata(path).await.map_err(|error| format!("{show} cannot be read: {error}"))?.len();
+    let size =
+        tokio::fs::metadata(path).await.map_err(|error| format!("{show} cannot be read: {error}"))?.len();
     if size > MOST_BYTES {
         return Err(format!("{show} has {size} bytes; {MOST_BYTES} fit, cut it up"));
     }

@@ -27,7 +27,10 @@ impl Tcp {
 }
 
 impl Connector for Tcp {
-    fn connect(&self, context: PortContext) -> impl Future<Output = Result<Box<dyn Port>, String>> + Send + 'static {
+    fn connect(
+        &self,
+        context: PortContext,
+    ) -> impl Future<Output = Result<Box<dyn Port>, String>> + Send + 'static {
         let address = self.address.clone();
         async move {
             let stream = within(CONNECT, TcpStream::connect(&address))
@@ -52,7 +55,8 @@ impl Connector for Tcp {
                             Err(error) => break error.to_string(),
                         },
                     };
-                    let event = PortEvent::Bytes { bytes: buffer[..count].to_vec(), received: reading.timer.now() };
+                    let event =
+                        PortEvent::Bytes { bytes: buffer[..count].to_vec(), received: reading.timer.now() };
                     if reading.events.send(reading.parcel(event)).await.is_err() {
                         return;
                     }

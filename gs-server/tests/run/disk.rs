@@ -3,25 +3,11 @@
 use std::time::Duration;
 
 use gs_server::run::RunOptions;
-use mission::{CommandIntent, Gate, Intent, LinkState, Principal, SatelliteId};
-use protocol::Telecommand;
+use mission::{LinkState, Principal};
 
-use crate::support::{Folder, Pty, Server, heartbeat, pause, until};
+use crate::support::{Folder, Pty, Server, heartbeat, pause, ping, until};
 
 const SOON: Duration = Duration::from_secs(5);
-
-fn ping() -> Intent {
-    Intent::Command(CommandIntent {
-        satellite: SatelliteId::new("sat").unwrap(),
-        link: None,
-        telecommand: Telecommand::Ping,
-        priority: 0,
-        gate: Gate::Heard,
-        expires_at: None,
-        attempts_allowed: None,
-        confirmation: None,
-    })
-}
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_full_disk_is_told_within_a_second_stops_the_uplink_and_loses_no_frame() {

@@ -1,4 +1,5 @@
 //! The whole server over real pseudo-terminals.
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot be set up has failed")]
 
 mod disk;
 mod serial;

@@ -2,11 +2,10 @@
 
 use std::time::Duration;
 
+use crate::support::{Folder, Pty, Server, heartbeat, pause, ping, until};
 use gs_server::run::RunOptions;
 use gs_server::storage::FrameQuery;
-use mission::{Accepted, CommandIntent, Gate, Intent, LinkState, Principal, SatelliteId};
-use protocol::Telecommand;
-use crate::support::{Folder, Pty, Server, heartbeat, pause, until};
+use mission::{Accepted, LinkState, Principal};
 
 const SOON: Duration = Duration::from_secs(3);
 
@@ -65,17 +64,10 @@ async fn a_foreign_program_can_be_the_satellite() {
     server.until_link("up", SOON, |state| *state == LinkState::Ok).await;
     pty.write(&heartbeat(1_000));
     until("heard", SOON, async || server.status().satellites[0].in_contact).await;
-    let intent = Intent::Command(CommandIntent {
-        satellite: SatelliteId::new("sat").unwrap(),
-        link: None,
-        telecommand: Telecommand::Ping,
-        priority: 0,
-        gate: Gate::Heard,
-        expires_at: None,
-        attempts_allowed: None,
-        confirmation: None,
-    });
-    let ask = async || server.ready.engine.intent(Principal::new("test"), "k1".into(), [7; 32], intent.clone()).await;
+    let intent = ping();
+    let ask = async || {
+        server.ready.engine.intent(Principal::new("test"), "k1".into(), [7; 32], intent.clone()).await
+    };
     let done = ask().await.unwrap();
     assert!(!done.replayed && matches!(done.accepted, Accepted::Command(_)));
     let again = ask().await.unwrap();
@@ -144,5 +136,29 @@ async fn modem_lines_that_are_not_there_are_named() {
             _ => false,
         })
         .await;
+    server.stop().await;
+}
+
+/// Bytes were handed to a port that went: what became of them is not known, and nothing is repeated behind our back.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_port_that_goes_while_a_frame_is_on_the_air_leaves_it_unknown_not_lost() {
+    let folder = Folder::new();
+    let mut pty = Pty::at(&folder.port());
+    let server = Server::start(RunOptions::new(folder.strapped())).await.unwrap();
+    server.until_link("up", SOON, |state| *state == LinkState::Ok).await;
+    pty.write(&heartbeat(1_000));
+    until("heard", SOON, async || server.status().satellites[0].in_contact).await;
+    let done = server.ready.engine.intent(Principal::new("test"), "k".into(), [7; 32], ping()).await.unwrap();
+    let Accepted::Command(id) = done.accepted else { unreachable!() };
+    until("on the air", Duration::from_secs(10), async || !pty.read().is_empty()).await;
+    std::fs::remove_file(folder.port()).unwrap();
+    drop(pty);
+    until("settled as unknown", SOON, async || {
+        let life = server.ready.store.command(i64::try_from(id.0).unwrap()).await.unwrap().unwrap();
+        let stages: Vec<String> = life.stages.iter().map(|stage| stage.stage.to_string()).collect();
+        assert!(!stages.contains(&"failed".to_owned()), "{stages:?}");
+        stages.contains(&"unknown".to_owned())
+    })
+    .await;
     server.stop().await;
 }

@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
+use crate::support::{Folder, Pty, Server, heartbeat, ping, until};
 use gs_server::config::Config;
+use gs_server::engine::IntentError;
 use gs_server::run::{RunError, RunOptions};
 use gs_server::storage::StoreError;
-use mission::LinkState;
-use crate::support::{Folder, Pty, Server, heartbeat, until};
+use mission::{LinkState, Principal};
 
 const SOON: Duration = Duration::from_secs(3);
 
@@ -41,6 +42,31 @@ async fn it_stops_within_five_seconds_and_forgets_nothing() {
     let again = Server::start(RunOptions::new(folder.strapped())).await.unwrap();
     let frames = again.ready.store.counts().await.unwrap().frames;
     assert!(frames >= 1, "{frames}");
+    again.stop().await;
+}
+
+/// A frame on the air is sent to its end, and its end is written down.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn it_stops_in_time_while_a_frame_is_on_the_air() {
+    let folder = Folder::new();
+    let mut pty = Pty::at(&folder.port());
+    let server = Server::start(RunOptions::new(folder.strapped())).await.unwrap();
+    server.until_link("up", SOON, |state| *state == LinkState::Ok).await;
+    pty.write(&heartbeat(1_000));
+    until("heard", SOON, async || server.status().satellites[0].in_contact).await;
+    server.ready.engine.intent(Principal::new("test"), "k".into(), [7; 32], ping()).await.unwrap();
+    until("on the air", Duration::from_secs(10), async || !pty.read().is_empty()).await;
+    let engine = server.ready.engine.clone();
+    let (took, report) = server.stop().await;
+    assert!(took < Duration::from_secs(5), "{took:?}");
+    assert_eq!(report.abandoned_tasks, 0);
+    let refused = engine.intent(Principal::new("test"), "later".into(), [7; 32], ping()).await;
+    assert_eq!(refused, Err(IntentError::Stopping));
+
+    let again = Server::start(RunOptions::new(folder.strapped())).await.unwrap();
+    let life = again.ready.store.command(1).await.unwrap().unwrap();
+    let stages: Vec<String> = life.stages.iter().map(|stage| stage.stage.to_string()).collect();
+    assert!(stages.contains(&"radiated".to_owned()), "{stages:?}");
     again.stop().await;
 }
 

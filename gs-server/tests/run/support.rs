@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use gs_server::config::Config;
 use gs_server::run::{Ready, Report, RunError, RunOptions, run_with};
-use mission::{LinkState, Status};
-use protocol::{Downlink, FRAME_LEN, FrameForm, Heartbeat};
+use mission::{CommandIntent, Gate, Intent, LinkState, SatelliteId, Status};
+use protocol::{Downlink, FRAME_LEN, FrameForm, Heartbeat, Telecommand};
 use serialport::TTYPort;
 use tempfile::TempDir;
 use tokio::net::TcpListener;
@@ -82,6 +82,20 @@ pub(crate) fn heartbeat(uptime_ms: u32) -> Vec<u8> {
     let mut frame = [0; FRAME_LEN];
     let length = protocol::encode_down(&Downlink::Heartbeat(beat), None, FrameForm::Full, &mut frame);
     frame[..length].to_vec()
+}
+
+/// A Ping for the satellite.
+pub(crate) fn ping() -> Intent {
+    Intent::Command(CommandIntent {
+        satellite: SatelliteId::new("sat").expect("a name"),
+        link: None,
+        telecommand: Telecommand::Ping,
+        priority: 0,
+        gate: Gate::Heard,
+        expires_at: None,
+        attempts_allowed: None,
+        confirmation: None,
+    })
 }
 
 /// A configuration of one strapped pseudo-terminal with a simulated key, in a folder of its own.
@@ -162,7 +176,12 @@ impl Server {
         self.status().links[0].state.clone()
     }
 
-    pub(crate) async fn until_link(&self, what: &str, limit: Duration, holds: impl Fn(&LinkState) -> bool) -> Duration {
+    pub(crate) async fn until_link(
+        &self,
+        what: &str,
+        limit: Duration,
+        holds: impl Fn(&LinkState) -> bool,
+    ) -> Duration {
         until(what, limit, async || holds(&self.link())).await
     }
 

@@ -5,15 +5,15 @@ use std::io::{Read as _, Write as _};
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::support::{Folder, Pty, Server, ping, until, wall};
 use gs_server::clock::{BusyToken, SteppedClock, SteppedOptions, Timer, Wire};
 use gs_server::engine::SeededEntropy;
 use gs_server::run::RunOptions;
-use mission::{Accepted, Clock as _, CommandIntent, Gate, Intent, LinkId, LinkState, MonoUs, Principal, SatelliteId, UtcUs};
-use protocol::{Key, Telecommand};
+use mission::{Accepted, Clock as _, LinkId, LinkState, MonoUs, Principal, UtcUs};
+use protocol::Key;
 use radio::airtime::LoraPhy;
 use radio::model::{ModelConfig, Ufreq};
 use radio::registers::Registers;
-use crate::support::{Folder, Pty, Server, until, wall};
 use satellite::{ChannelConfig, Device, DeviceConfig, DeviceOutput, TwinConfig};
 use tokio::sync::mpsc;
 
@@ -60,7 +60,9 @@ async fn far_end(
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_twin_on_a_pseudo_terminal_is_heard_and_commanded_on_stepped_time() {
     let folder = Folder::new();
-    let clock = SteppedClock::new(SteppedOptions { utc_at_origin: UtcUs(1_805_544_000_000_000), speed: None }).unwrap();
+    let clock =
+        SteppedClock::new(SteppedOptions { utc_at_origin: UtcUs(1_805_544_000_000_000), speed: None })
+            .unwrap();
     let timer: Arc<dyn Timer> = Arc::new(clock.clone());
     let starting = timer.busy("test");
     let wire = Wire::new(&timer);
@@ -93,7 +95,14 @@ async fn a_twin_on_a_pseudo_terminal_is_heard_and_commanded_on_stepped_time() {
         ..ModelConfig::default()
     };
     let device = Device::new(DeviceConfig::new(twin, ChannelConfig::perfect(), model));
-    let far = tokio::spawn(far_end(device, Arc::clone(&timer), wire.clone(), written, pty.master.try_clone_native().unwrap(), starting.clone()));
+    let far = tokio::spawn(far_end(
+        device,
+        Arc::clone(&timer),
+        wire.clone(),
+        written,
+        pty.master.try_clone_native().unwrap(),
+        starting.clone(),
+    ));
 
     let mut options = RunOptions::new(folder.config("mode_pins = \"software\""));
     options.config.links[0].rssi = Some(true);
@@ -102,26 +111,14 @@ async fn a_twin_on_a_pseudo_terminal_is_heard_and_commanded_on_stepped_time() {
     options.wires.insert(LinkId::new("pty").unwrap(), wire);
     let began = wall();
     let server = Server::start(options).await.unwrap();
-    let mut done = None;
     drop(starting);
     let patience = Duration::from_secs(30);
     let told = || format!("{:?} {:?} {:?}", server.status(), clock.holders(), clock.now());
     until("the link is up", patience, async || server.link() == LinkState::Ok).await;
     until("heard", patience, async || server.status().satellites[0].in_contact).await;
-    let intent = Intent::Command(CommandIntent {
-        satellite: SatelliteId::new("sat").unwrap(),
-        link: None,
-        telecommand: Telecommand::Ping,
-        priority: 0,
-        gate: Gate::Heard,
-        expires_at: None,
-        attempts_allowed: Some(5),
-        confirmation: None,
-    });
-    if let Ok(accepted) = server.ready.engine.intent(Principal::new("test"), "ping".into(), [1; 32], intent).await {
-        done = Some(accepted.accepted);
-    }
-    let Some(Accepted::Command(id)) = done else { panic!("not accepted: {}", told()) };
+    let done =
+        server.ready.engine.intent(Principal::new("test"), "ping".into(), [1; 32], ping()).await.unwrap();
+    let Accepted::Command(id) = done.accepted else { panic!("not accepted: {}", told()) };
     until("answered", patience, async || {
         let life = server.ready.store.command(i64::try_from(id.0).unwrap()).await.unwrap().unwrap();
         format!("{life:?}").contains("answered")

@@ -38,13 +38,22 @@ pub(super) fn usb(wanted: &UsbId) -> Result<String, String> {
         SerialPortType::UsbPort(usb) => {
             usb.vid == wanted.vid
                 && usb.pid == wanted.pid
-                && wanted.serial_number.as_ref().is_none_or(|serial| usb.serial_number.as_ref() == Some(serial))
+                && wanted
+                    .serial_number
+                    .as_ref()
+                    .is_none_or(|serial| usb.serial_number.as_ref() == Some(serial))
         }
         _ => false,
     });
     found.map(|port| port.port_name).ok_or_else(|| {
-        let serial = wanted.serial_number.as_ref().map(|s| format!(" with serial number {s}")).unwrap_or_default();
-        format!("USB adapter {:04x}:{:04x}{serial} is not plugged in; {}", wanted.vid, wanted.pid, there_are())
+        let serial =
+            wanted.serial_number.as_ref().map(|s| format!(" with serial number {s}")).unwrap_or_default();
+        format!(
+            "USB adapter {:04x}:{:04x}{serial} is not plugged in; {}",
+            wanted.vid,
+            wanted.pid,
+            there_are()
+        )
     })
 }
 

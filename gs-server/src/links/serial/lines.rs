@@ -40,10 +40,10 @@ mod tests {
     #[test]
     fn the_truth_table_of_the_mode_pins() {
         for (m1, m0, rts, dtr) in [
-            (false, false, true, true),   // normal
-            (true, false, false, true),   // configuration
-            (false, true, true, false),   // wake on radio
-            (true, true, false, false),   // sleep
+            (false, false, true, true), // normal
+            (true, false, false, true), // configuration
+            (false, true, true, false), // wake on radio
+            (true, true, false, false), // sleep
         ] {
             assert_eq!(dtr_rts(m0, m1), (dtr, rts));
         }

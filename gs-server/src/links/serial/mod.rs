@@ -61,7 +61,8 @@ impl Serial {
             Wanted::Usb(usb) => find::usb(usb)?,
             Wanted::Path(path) => find::path(path)?,
         };
-        let real = std::fs::canonicalize(&path).map_err(|error| format!("{path} cannot be found: {error}"))?;
+        let real =
+            std::fs::canonicalize(&path).map_err(|error| format!("{path} cannot be found: {error}"))?;
         let port = serialport::new(&path, self.baud)
             .timeout(READ_WAIT)
             .flow_control(FlowControl::None)
@@ -78,7 +79,10 @@ impl Serial {
 }
 
 impl Connector for Serial {
-    fn connect(&self, context: PortContext) -> impl Future<Output = Result<Box<dyn Port>, String>> + Send + 'static {
+    fn connect(
+        &self,
+        context: PortContext,
+    ) -> impl Future<Output = Result<Box<dyn Port>, String>> + Send + 'static {
         let this = self.clone();
         async move {
             match tokio::task::spawn_blocking(move || this.open(context)).await {

@@ -71,7 +71,12 @@ impl Watched {
     }
 }
 
-pub(super) fn start(port: TTYPort, place: Place, serial: &Serial, context: PortContext) -> io::Result<OpenSerial> {
+pub(super) fn start(
+    port: TTYPort,
+    place: Place,
+    serial: &Serial,
+    context: PortContext,
+) -> io::Result<OpenSerial> {
     let (commands, inbox) = sync_channel(COMMANDS);
     let open = OpenSerial {
         commands,
@@ -251,7 +256,7 @@ impl Writing {
     fn obey(&mut self, command: Command) -> Result<(), String> {
         match command {
             Command::Write(bytes) => {
-                if let Some(gauge) = self.context.from_host() {
+                if let Some(gauge) = self.context.gauge_from_host() {
                     gauge.wrote(bytes.len());
                 }
                 self.write_all(&bytes).map_err(|error| format!("writing failed: {error}"))?;
@@ -293,8 +298,9 @@ impl Writing {
     }
 
     fn look_at_aux(&mut self) -> Result<(), String> {
-        let read = lines::read(&mut self.port, self.aux)
-            .map_err(|error| format!("AUX cannot be read ({error}); where there are no modem lines: aux = \"absent\""))?;
+        let read = lines::read(&mut self.port, self.aux).map_err(|error| {
+            format!("AUX cannot be read ({error}); where there are no modem lines: aux = \"absent\"")
+        })?;
         let idle = read.map(|asserted| lines::aux_idle(asserted, self.aux_inverted));
         if let Some(level) = idle.filter(|_| idle != self.shown) {
             self.shown = idle;
