@@ -315,3 +315,22 @@ fn tell(context: &PortContext, event: PortEvent) -> bool {
     let events: &EventSender = &context.events;
     events.blocking_send(context.parcel(event)).is_ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_that_should_move_and_does_not_is_noticed_after_five_looks() {
+        let mut watched = Watched::new();
+        for _ in 0..20 {
+            assert!(!watched.hangs(false), "it has nothing to do");
+        }
+        for _ in 1..PATIENCE {
+            assert!(!watched.hangs(true));
+        }
+        assert!(watched.hangs(true));
+        watched.beats.fetch_add(1, Ordering::Relaxed);
+        assert!(!watched.hangs(true), "it moves again");
+    }
+}
