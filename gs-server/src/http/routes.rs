@@ -2,7 +2,6 @@
 
 use axum::Router;
 use axum::handler::Handler;
-use axum::http::Method;
 use axum::middleware::from_fn_with_state;
 use axum::routing::{MethodRouter, get, post};
 
@@ -31,11 +30,6 @@ pub(super) struct Route {
 }
 
 impl Route {
-    /// The method that it takes.
-    pub(super) fn method(&self) -> Method {
-        if self.access == Access::Write { Method::POST } else { Method::GET }
-    }
-
     pub(super) fn add_to(self, router: Router<App>, app: &App) -> Router<App> {
         let handler = match self.access {
             Access::Write => self.handler.route_layer(from_fn_with_state(app.clone(), guard_write)),

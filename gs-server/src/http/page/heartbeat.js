@@ -72,12 +72,17 @@ export function paintHeartbeat() {
     say(byId("heartbeat-due"), "No heartbeat heard yet.");
     return;
   }
+  if (model.awaySince !== null) {
+    age.classList.add("old");
+    say(age, "old: the server is away");
+    say(byId("heartbeat-due"), `heard ${date(heard).slice(0, 10)} ${clock(heard)} UTC`);
+    return;
+  }
   say(age, `${span(t - heard)} old`);
   const due = ms(s.next_heartbeat_at);
   const late = due !== null && t > due + 5000;
   age.classList.toggle("old", late && s.in_view !== false);
   say(byId("heartbeat-due"), `heard ${clock(heard)} UTC · ${dueText(due, t, s)}`);
-  byId("values").classList.toggle("dim", !model.live);
 }
 
 function dueText(due, t, s) {

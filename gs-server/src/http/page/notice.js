@@ -6,7 +6,7 @@ import { model } from "./model.js";
 export function paintNotice() {
   const lines = [];
   if (model.awaySince !== null) {
-    lines.push(`The server is away since ${clock(model.awaySince)} UTC. What you see is old. Trying again by itself.`);
+    lines.push(`The server is away since ${clock(model.awaySince)} UTC (this machine's clock). What you see is old. Trying again by itself.`);
   }
   const { station } = model;
   if (station?.storage.failing) lines.push(`Storage: ${station.storage.failing}`);

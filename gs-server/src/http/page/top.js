@@ -16,12 +16,15 @@ export function paintTop() {
   byId("top").classList.toggle("is-simulated", station.simulated);
   document.title = `${station.simulated ? "SIMULATED · " : ""}${s?.satellite ?? "PixelSat Ground"}`;
   if (!s) return;
-  say(byId("contact"), contact(s, t));
   const heard = ms(s.heard_at);
-  say(byId("link-lamp"), heard === null ? "nothing yet" : `${span(t - heard)} ago`);
+  // While the server is away nobody knows how things stand: no age is made up, no lamp claims anything.
+  const isAway = model.awaySince !== null;
+  say(byId("contact"), isAway ? "unknown" : contact(s, t));
+  const age = isAway ? `${clock(heard)} UTC` : `${span(t - heard)} ago`;
+  say(byId("link-lamp"), heard === null ? "nothing yet" : age);
   say(byId("uplink"), s.uplink || "—");
   byId("uplink").title = s.uplink;
-  paintTransmitter(station.links.filter((l) => l.satellite === s.satellite));
+  paintTransmitter(station.links.filter((l) => l.satellite === s.satellite), isAway);
 }
 
 function contact(s, t) {
@@ -33,8 +36,13 @@ function contact(s, t) {
   return s.heard_at === null ? "not heard yet" : "silent";
 }
 
-function paintTransmitter(links) {
+function paintTransmitter(links, isAway) {
   const lamp = byId("transmitter");
+  if (isAway) {
+    lamp.className = "lamp";
+    say(lamp, "UNKNOWN");
+    return;
+  }
   const state = links.some((l) => l.on_air) ? "on-air" : links.some((l) => l.armed) ? "armed" : "safe";
   lamp.className = `lamp ${state}`;
   say(lamp, { "on-air": "ON AIR", armed: "ARMED", safe: "SAFE" }[state]);
