@@ -12,13 +12,17 @@
 //! | [`config`] | one TOML file, a struct per section |
 //! | [`lifecycle`] | how tasks live and die |
 //! | [`keys`], [`decode`] | key files; captures to JSON |
+//! | [`twin`], [`demo`] | the simulated satellite behind a real port; a pass with everything real but the satellite |
+//! | [`cli`] | the command line, a file per verb |
 //!
 //! What it does **not** do: decide what to send or when (the mission engine does), know the wire format (`protocol`
 //! does) or the module's commands (`radio` does). Tasks and threads are born only here.
 
+pub mod cli;
 pub mod clock;
 pub mod config;
 pub mod decode;
+pub mod demo;
 pub mod engine;
 pub mod http;
 pub mod hub;
@@ -27,4 +31,5 @@ pub mod lifecycle;
 pub mod links;
 pub mod run;
 pub mod storage;
+pub mod twin;
 pub mod witness;

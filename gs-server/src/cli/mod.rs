@@ -1,0 +1,120 @@
+//! The command line: `gs-server VERB`. Each verb is one file: its arguments, its help, what it prints.
+//!
+//! What a script may read goes to standard output (with `--json` as one object, or one object a line); everything said
+//! to a person besides goes to standard error. Exit codes are those of [`Exit`], explained in `docs/cli.md`.
+
+mod config;
+mod decode;
+mod demo;
+mod failure;
+mod key;
+mod redecode;
+mod serve;
+mod shell;
+mod twin;
+
+pub use failure::{Exit, Failure};
+
+use std::sync::Arc;
+
+use clap::{Parser, Subcommand};
+
+/// Ground station and mission control for CubeSats that talk LoRa: the server, a satellite to practise on, and tools.
+#[derive(Debug, Parser)]
+#[command(
+    name = "gs-server",
+    version,
+    max_term_width = 100,
+    arg_required_else_help = true,
+    subcommand_required = true,
+    after_help = "Exit codes: 0 done, 1 failed or found nothing, 2 wrong usage, 3 refused. Every verb has --help.\n\
+                  First contact: gs-server demo"
+)]
+pub struct Cli {
+    /// What to log to standard error: a level, or `info,gs_server::links=debug`; also GS_LOG
+    #[arg(long, global = true, value_name = "FILTER", env = "GS_LOG", help_heading = "Logging")]
+    pub log: Option<String>,
+    /// Log one JSON object a line
+    #[arg(long, global = true, help_heading = "Logging")]
+    pub log_json: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the station: links, engine, store, API and page
+    Serve(serve::Serve),
+    /// Check a configuration, or print an example of one
+    #[command(subcommand)]
+    Config(config::Config),
+    /// Watch a simulated satellite pass, with everything real but the satellite
+    Demo(demo::Demo),
+    /// The simulated satellite alone, for any ground software
+    #[command(subcommand)]
+    Twin(twin::Twin),
+    /// Decode a capture: frames in, JSON out; no key needed
+    Decode(decode::Decode),
+    /// Make and list key files; their bytes are never printed
+    #[command(subcommand)]
+    Key(key::Key),
+    /// Derive every value again from the raw frames
+    Redecode(redecode::Redecode),
+}
+
+impl Cli {
+    /// What to log and how: `--log` and GS_LOG go before the configuration; without any, the verbs that serve tell what
+    /// they do, and the tools only what is wrong.
+    pub fn log_settings(&self) -> LogSettings {
+        let (filter, json) = match &self.command {
+            // A configuration that is none is complained about where it is used.
+            Command::Serve(serve) => match crate::config::Config::load(&serve.config) {
+                Ok(config) => (config.log.filter, config.log.json),
+                Err(_) => ("info".to_owned(), false),
+            },
+            _ => ("warn".to_owned(), false),
+        };
+        LogSettings { filter: self.log.clone().unwrap_or(filter), json: self.log_json || json }
+    }
+
+    /// Does what was asked. `set_log_filter` changes what the global logger logs.
+    ///
+    /// # Errors
+    /// [`Failure`], with the exit code that goes with it.
+    pub fn run(self, set_log_filter: SetLogFilter) -> Result<Exit, Failure> {
+        match self.command {
+            Command::Serve(serve) => serve.run(set_log_filter),
+            Command::Config(config) => config.run(),
+            Command::Demo(demo) => demo.run(),
+            Command::Twin(twin) => twin.run(),
+            Command::Decode(decode) => decode.run(),
+            Command::Key(key) => key.run(),
+            Command::Redecode(redecode) => redecode.run(),
+        }
+    }
+}
+
+/// What the one global logger is set to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LogSettings {
+    /// A filter of `tracing`.
+    pub filter: String,
+    /// One JSON object a line.
+    pub json: bool,
+}
+
+/// Changes the filter of the global logger, which only `main` has.
+pub type SetLogFilter = Arc<dyn Fn(&str) + Send + Sync>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn arguments_contradict_nowhere() {
+        Cli::command().debug_assert();
+    }
+}
