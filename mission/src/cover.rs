@@ -60,7 +60,8 @@ pub fn cheapest_cover(missing: &[u16], longest: u16, cost: Cost) -> Cover {
                 .saturating_add(cost.request_us)
                 .saturating_add(cost.chunk_us.saturating_mul(u64::from(span)));
             let total = (total_us, requests + 1, bridged + (span - wanted));
-            if choice.is_none_or(|(least, _)| total < least) {
+            // Equal ones: the longest first range, so that a picture grows from its top.
+            if choice.is_none_or(|(least, _)| total <= least) {
                 choice = Some((total, j));
             }
         }
