@@ -34,6 +34,9 @@ pub struct Decode {
     /// The byte after each frame is its level, as the radio module appends it
     #[arg(long)]
     rssi: bool,
+    /// Add the whole frame in hex to each object
+    #[arg(long)]
+    hex: bool,
     /// Leave out what was skipped
     #[arg(long)]
     frames_only: bool,
@@ -53,7 +56,7 @@ impl Decode {
     fn decode(&self, mut input: Box<dyn Read>, output: impl io::Write, name: &str) -> Result<Exit, Failure> {
         let mut printer = Printer { out: BufWriter::new(output), frames_only: self.frames_only, written: Ok(()) };
         let mut unwrap = Unwrap::new(self.format);
-        let mut decoder = Decoder::new(self.rssi);
+        let mut decoder = Decoder::new(self.rssi).with_hex(self.hex);
         let mut piece = vec![0; 1 << 16];
         let mut bytes = Vec::new();
         loop {

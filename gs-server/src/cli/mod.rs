@@ -8,6 +8,7 @@ mod decode;
 mod demo;
 mod failure;
 mod key;
+mod radio;
 mod redecode;
 mod serve;
 mod shell;
@@ -57,6 +58,9 @@ pub enum Command {
     Twin(twin::Twin),
     /// Decode a capture: frames in, JSON out; no key needed
     Decode(decode::Decode),
+    /// The radio module by hand
+    #[command(subcommand)]
+    Radio(radio::Radio),
     /// Make and list key files; their bytes are never printed
     #[command(subcommand)]
     Key(key::Key),
@@ -90,6 +94,7 @@ impl Cli {
             Command::Demo(demo) => demo.run(),
             Command::Twin(twin) => twin.run(),
             Command::Decode(decode) => decode.run(),
+            Command::Radio(radio) => radio.run(),
             Command::Key(key) => key.run(),
             Command::Redecode(redecode) => redecode.run(),
         }

@@ -24,6 +24,7 @@ const NESTED_LIMIT: u64 = 2 * FRAME_LEN as u64;
 #[derive(Debug)]
 pub struct Decoder {
     rssi: bool,
+    hex: bool,
     down: DownDecoder,
     up: UpDecoder,
     skipped: SkippedRuns,
@@ -39,6 +40,7 @@ impl Decoder {
     pub fn new(rssi: bool) -> Self {
         Self {
             rssi,
+            hex: false,
             down: DownDecoder::new(rssi),
             up: UpDecoder::new(),
             skipped: SkippedRuns::default(),
@@ -48,13 +50,19 @@ impl Decoder {
         }
     }
 
+    /// Puts the whole frame in hex into each report.
+    #[must_use]
+    pub fn with_hex(self, hex: bool) -> Self {
+        Self { hex, ..self }
+    }
+
     /// Takes the next bytes, in any piece.
     pub fn push(&mut self, bytes: &[u8], tell: &mut dyn FnMut(Report)) {
         for step in bytes.chunks(STEP_LEN) {
             self.skipped.push(step);
             self.summary.bytes += step.len() as u64;
-            let Self { down, skipped, pending, last, .. } = self;
-            down.push(step, &mut |item| take(item, skipped, pending, last));
+            let Self { down, skipped, pending, last, hex, .. } = self;
+            down.push(step, &mut |item| take(item, skipped, pending, last, *hex));
             self.release(false, tell);
             let Self { up, skipped, last, summary, .. } = self;
             up.push(step, &mut |offset, frame| {
@@ -68,11 +76,16 @@ impl Decoder {
         }
     }
 
+    /// The line has gone quiet for longer than a pause within a frame: what was found so far is told.
+    pub fn silence(&mut self, tell: &mut dyn FnMut(Report)) {
+        let Self { down, skipped, pending, last, hex, .. } = self;
+        down.silence(&mut |item| take(item, skipped, pending, last, *hex));
+        self.release(true, tell);
+    }
+
     /// The input has ended: what is still open is decided.
     pub fn finish(mut self, tell: &mut dyn FnMut(Report)) -> Summary {
-        let Self { down, skipped, pending, last, .. } = &mut self;
-        down.silence(&mut |item| take(item, skipped, pending, last));
-        self.release(true, tell);
+        self.silence(tell);
         self.settle(true, tell);
         self.summary
     }
@@ -116,10 +129,12 @@ fn take(
     skipped: &mut SkippedRuns,
     pending: &mut Vec<FrameReport>,
     last: &mut Option<(u64, u64)>,
+    hex: bool,
 ) {
     match item {
         DownItem::Frame { offset, frame, nested } => {
-            let report = FrameReport::new(offset, &frame, nested);
+            let mut report = FrameReport::new(offset, &frame, nested);
+            report.hex = hex.then(|| hex::encode(frame.bytes()));
             skipped.cover(offset, report.end());
             if !nested {
                 *last = Some((offset, report.end()));

@@ -50,6 +50,9 @@ pub struct FrameReport {
     /// Why there are no values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
+    /// The whole frame in hex, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hex: Option<String>,
     /// The payload in hex, where there are no values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub payload_hex: Option<String>,
@@ -77,6 +80,7 @@ impl FrameReport {
             tag: frame.tag().map(protocol::RequestTag::get),
             nested,
             rssi_dbm: None,
+            hex: None,
             payload_hex: fields.is_none().then(|| hex::encode(frame.payload())),
             fields,
             error,

@@ -10,9 +10,9 @@
 //! find frames, decide when to transmit.
 
 pub mod driven;
-mod port;
+pub(crate) mod port;
 mod replay;
-mod serial;
+pub(crate) mod serial;
 mod tcp;
 
 use std::sync::Arc;

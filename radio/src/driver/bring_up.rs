@@ -343,6 +343,7 @@ impl Driver {
     fn wanted_registers(&self) -> Registers {
         let held = self.facts.registers.unwrap_or(Registers::FACTORY);
         let rssi_byte = self.config.rssi_byte.unwrap_or(held.rssi_byte());
+        let needs_switch = self.config.mode_pins == ModePins::Software;
         // Reserved bits stay; sub-packet 240, no ambient RSSI, no repeater, no LBT; the WOR period matters to nobody.
         let mut wanted = Registers(held.0);
         wanted.0[4] &= 0x18;
@@ -352,7 +353,7 @@ impl Driver {
             .with_net_id(self.config.net_id)
             .with_baud_code(3)
             .with_air_rate(self.config.air_rate)
-            .with_software_switch(self.config.mode_pins == ModePins::Software)
+            .with_software_switch(self.config.software_switch.unwrap_or(needs_switch))
             .with_power(self.config.power)
             .with_channel(self.config.channel)
             .with_rssi_byte(rssi_byte)

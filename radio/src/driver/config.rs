@@ -46,6 +46,9 @@ pub struct DriverConfig {
     pub air_rate: u8,
     /// RSSI byte after each received packet: on, off, or (None) as the module has it.
     pub rssi_byte: Option<bool>,
+    /// Modes may be changed by a command on the data UART (REG1 bit 2): on, off, or (None) as `mode_pins` needs it.
+    /// Turned on once with the lines wired, it lets a module be used with [`ModePins::Software`] later.
+    pub software_switch: Option<bool>,
     /// How the mode pins are driven.
     pub mode_pins: ModePins,
     /// Whether AUX is wired.
@@ -70,6 +73,7 @@ impl Default for DriverConfig {
             power: PowerStep::Dbm21,
             air_rate: 2,
             rssi_byte: None,
+            software_switch: None,
             mode_pins: ModePins::Lines { inverted: false },
             aux: AuxWiring::Present,
             transmit_unverified: false,
