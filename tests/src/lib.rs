@@ -1,1 +1,34 @@
-//! tests
+//! What end-to-end tests need: the real binary, real processes, real sockets, real pseudo-terminals.
+//!
+//! | module | what |
+//! | --- | --- |
+//! | [`binary`] | where `gs-server` is, built when it is missing or old |
+//! | [`folder`] | a folder of its own for each test, with a configuration and a key |
+//! | [`process`] | a server, a twin, a foreign satellite: started, watched, killed |
+//! | [`http`] | a client of API v1 that believes only whole answers |
+//! | [`pty`] | a pseudo-terminal, for tests that play the radio themselves |
+//! | [`stream`] | a follower of the WebSocket |
+//! | [`journal`] | what the twin wrote down: the far end's own witness |
+//! | [`wait`] | waiting for the real world |
+//!
+//! Everything here is as far outside the server as an operator is: it knows the wire types (`api`), the radio link
+//! (`protocol`) and the twin's journal (`satellite`), and nothing of the server's inside.
+#![expect(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot be set up has failed, loudly"
+)]
+
+pub mod binary;
+pub mod folder;
+pub mod http;
+pub mod journal;
+pub mod process;
+pub mod pty;
+pub mod stream;
+pub mod wait;
+
+pub use folder::Folder;
+pub use http::Client;
+pub use process::{Process, Server, Twin};
+pub use pty::Pty;
