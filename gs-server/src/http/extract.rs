@@ -133,26 +133,27 @@ pub(super) fn whole<T>(items: Vec<T>) -> Page<T> {
 /// The satellite that is meant: the one named, or the only one.
 pub(super) fn satellite(app: &App, named: Option<&str>) -> Result<SatelliteId, Failure> {
     let known = || {
-        let names: Vec<&str> = app.state.identity.satellites.iter().map(|(id, _)| id.as_str()).collect();
+        let names: Vec<&str> = app.state.identity.satellites.iter().map(|known| known.id.as_str()).collect();
         names.join(", ")
     };
     match (named, app.state.identity.satellites.as_slice()) {
-        (None, [(only, _)]) => Ok(only.clone()),
+        (None, [only]) => Ok(only.id.clone()),
         (None, _) => Err(Failure::field(
             ProblemKind::UnknownSatellite,
             "satellite",
             format!("name one of: {}", known()),
         )),
-        (Some(name), satellites) => {
-            satellites.iter().find_map(|(id, _)| (id.as_str() == name).then(|| id.clone())).ok_or_else(|| {
+        (Some(name), satellites) => satellites
+            .iter()
+            .find_map(|known| (known.id.as_str() == name).then(|| known.id.clone()))
+            .ok_or_else(|| {
                 let shown: String = name.chars().take(40).collect();
                 Failure::field(
                     ProblemKind::UnknownSatellite,
                     "satellite",
                     format!("'{shown}' is not in the configuration; there is {}", known()),
                 )
-            })
-        }
+            }),
     }
 }
 

@@ -81,20 +81,32 @@ pub struct HttpState {
 pub struct Identity {
     /// The station.
     pub station: StationId,
-    /// Its satellites with the ids of their keys.
-    pub satellites: Vec<(SatelliteId, Option<KeyId>)>,
+    /// Its satellites.
+    pub satellites: Vec<SatelliteIdentity>,
     /// Time, satellite or radio are made up.
     pub simulated: bool,
+}
+
+/// A satellite, from the configuration.
+#[derive(Debug, Clone)]
+pub struct SatelliteIdentity {
+    /// The satellite.
+    pub id: SatelliteId,
+    /// The id of its key.
+    pub key: Option<KeyId>,
+    /// Microseconds between two of its heartbeats.
+    pub heartbeat_period_us: i64,
 }
 
 impl Identity {
     /// The identity of a configured station.
     #[must_use]
     pub fn of(config: &StationConfig, simulated: bool) -> Self {
-        let satellites = config
-            .satellites
-            .iter()
-            .map(|satellite| (satellite.id.clone(), satellite.key.as_ref().map(|key| key.id())));
+        let satellites = config.satellites.iter().map(|satellite| SatelliteIdentity {
+            id: satellite.id.clone(),
+            key: satellite.key.as_ref().map(protocol::Key::id),
+            heartbeat_period_us: i64::try_from(satellite.profile.heartbeat_period_us).unwrap_or(i64::MAX),
+        });
         Self { station: config.station.clone(), satellites: satellites.collect(), simulated }
     }
 }

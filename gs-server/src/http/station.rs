@@ -47,13 +47,20 @@ pub(super) fn view(app: &App, status: &Status, last_sequence: i64) -> StationVie
 
 fn satellite_view(app: &App, status: &SatelliteStatus) -> SatelliteView {
     let at = |utc: Option<UtcUs>| utc.map(|utc| time(utc.0));
-    let identity = app.state.identity.satellites.iter().find(|(id, _)| *id == status.satellite);
+    let identity = app.state.identity.satellites.iter().find(|known| known.id == status.satellite);
+    // The beat that was just heard is not the next one, though its slot may still be open.
+    let next_heartbeat_at = status.next_heartbeat_at.map(|next| match (status.heartbeat_at, identity) {
+        (Some(heard), Some(known)) if heard >= next.plus(-known.heartbeat_period_us / 2) => {
+            next.plus(known.heartbeat_period_us)
+        }
+        _ => next,
+    });
     SatelliteView {
         satellite: status.satellite.to_string(),
-        key: identity.and_then(|(_, key)| key.map(|key| key.to_string())),
+        key: identity.and_then(|known| known.key).map(|key| key.to_string()),
         heard_at: at(status.heard_at),
         heartbeat_at: at(status.heartbeat_at),
-        next_heartbeat_at: at(status.next_heartbeat_at),
+        next_heartbeat_at: at(next_heartbeat_at),
         in_contact: status.in_contact,
         in_view: status.in_view,
         los_at: at(status.los_at),

@@ -21,16 +21,23 @@ function row(command) {
   const li = make("li", "command");
   if (!GOING.includes(command.stage)) li.classList.add("over");
   li.append(make("span", "id", `#${command.id}`));
-  const args = Object.entries(command.arguments).map(([name, value]) => `${name} ${JSON.stringify(value)}`).join(", ");
+  const args = Object.entries(command.arguments)
+    .filter(([, value]) => value !== false)
+    .map(([name, value]) => (value === true ? name : `${name} ${typeof value === "string" ? value : JSON.stringify(value)}`))
+    .join(", ");
   const what = make("span", "what", `${command.command} ${short(command.arguments) ?? args}`.trim());
   what.title = `${command.command} ${args}\nby ${command.principal}, attempt ${command.attempt} of ${command.attempts_allowed}`;
-  li.append(what, lights(command), make("span", BAD.includes(command.stage) ? "word bad" : "word", command.stage));
+  li.append(what, lights(command), make("span", isWorrying(command) ? "word bad" : "word", command.stage));
   return li;
 }
 
+/** The machine repeats its own requests by itself: one that was lost is nothing to worry about. */
+const isWorrying = (command) => BAD.includes(command.stage) && !(command.stage === "unknown" && command.download !== null);
+
 /** A range of chunks as operators say it. */
 function short({ first, count }) {
-  return first === undefined || count === undefined ? null : `${first} – ${first + count - 1}`;
+  if (first === undefined || count === undefined) return null;
+  return count === 1 ? `${first}` : `${first} – ${first + count - 1}`;
 }
 
 function lights(command) {
@@ -42,7 +49,7 @@ function lights(command) {
   LIGHTS.forEach((_, i) => {
     const light = make("i");
     if (i < reached) light.classList.add("lit");
-    if (i === reached - 1 && BAD.includes(command.stage)) light.classList.add("bad");
+    if (i === reached - 1 && BAD.includes(command.stage)) light.classList.add(isWorrying(command) ? "bad" : "lost");
     else if (i === reached - 1 && GOING.includes(command.stage)) light.classList.add("now");
     box.append(light);
   });

@@ -26,6 +26,6 @@ export function span(duration) {
 /** A number with a fixed width of digits; `invalid` for what a failed sensor sent. */
 export function number(value, digits = 2) {
   if (value === null || value === undefined) return "invalid";
-  if (value !== 0 && (Math.abs(value) >= 1e6 || Math.abs(value) < 10 ** -digits)) return value.toExponential(2);
+  if (Math.abs(value) >= 1e6) return value.toExponential(2);
   return value.toFixed(digits);
 }

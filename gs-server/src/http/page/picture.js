@@ -18,6 +18,7 @@ export const refreshPicture = atMostEvery(1500, async () => {
   paintGrid();
   describe(image, chunks);
   const version = `${image.id}:${chunks.held}:${chunks.conflicts}`;
+  if (!shown?.startsWith(`${image.id}:`)) hide("Declared; it begins with chunk 0.");
   if (chunks.held > 0 && version !== shown) load(image, version);
 });
 
@@ -35,23 +36,24 @@ function describe(image, chunks) {
 async function load(image, version) {
   const next = new Image();
   next.src = `/api/v1/images/${image.id}/file?v=${encodeURIComponent(version)}`;
-  const note = byId("image-none");
   try {
     await next.decode();
   } catch {
-    if (shown === null || !shown.startsWith(`${image.id}:`)) {
-      byId("image").hidden = true;
-      note.hidden = false;
-      say(note, "Nothing to see yet: the picture begins with chunk 0.");
-    }
-    return;
+    return; // What was there stays.
   }
   const img = byId("image");
   img.src = next.src;
   img.alt = `Image ${image.id}, ${image.held} of ${image.chunks} chunks`;
   img.hidden = false;
-  note.hidden = true;
+  byId("image-none").hidden = true;
   shown = version;
+}
+
+function hide(why) {
+  shown = null;
+  byId("image").hidden = true;
+  byId("image-none").hidden = false;
+  say(byId("image-none"), why);
 }
 
 const COLOURS = { "#": "--text", "!": "--distress", ".": "--faint" };
@@ -93,11 +95,8 @@ export function paintGrid() {
 }
 
 export function resetPicture() {
-  shown = null;
   map = "";
-  byId("image").hidden = true;
-  byId("image-none").hidden = false;
-  say(byId("image-none"), "No image declared yet.");
+  hide("No image declared yet.");
   say(byId("picture-count"), "");
   say(byId("picture-line"), "");
   byId("picture-bar").style.width = "0";
