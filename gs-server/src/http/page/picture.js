@@ -18,7 +18,7 @@ export const refreshPicture = atMostEvery(1500, async () => {
   paintGrid();
   describe(image, chunks);
   const version = `${image.id}:${chunks.held}:${chunks.conflicts}`;
-  if (!shown?.startsWith(`${image.id}:`)) hide("Declared; it begins with chunk 0.");
+  if (!shown?.startsWith(`${image.id}:`)) hide(map[0] === "." ? "Chunk 0, the head of the picture, is still missing." : "The picture is on its way.");
   if (chunks.held > 0 && version !== shown) load(image, version);
 });
 
