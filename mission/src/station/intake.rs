@@ -29,6 +29,8 @@ pub(super) struct Heard {
     pub(super) tag: Option<RequestTag>,
     /// From our own radio, now: it tells about the present. Otherwise it only fills the archive.
     pub(super) live: bool,
+    /// From our own radio, now or before storage failed.
+    pub(super) from_radio: bool,
     /// Bytes of the frame, for how long it was on the air.
     pub(super) length: usize,
     /// These bytes were heard a moment ago already.
@@ -41,6 +43,34 @@ struct How {
     promoted: bool,
     source: Source,
     rssi_dbm: Option<i16>,
+}
+
+/// The rows of a frame that was heard.
+fn rows(
+    id: FrameId,
+    route: Route,
+    frame: &DownFrame<'_>,
+    how: &How,
+    heard_at: UtcUs,
+) -> (FrameRecord, ReceptionRecord) {
+    let record = FrameRecord {
+        id,
+        route: route.clone(),
+        bytes: frame.bytes().into(),
+        form: frame.form(),
+        packet_type: frame.header().map(|header| header.packet_type),
+        tag: frame.tag(),
+        nested: how.nested,
+        heard_at,
+    };
+    let reception = ReceptionRecord {
+        frame: id,
+        route,
+        source: how.source,
+        received_at: heard_at,
+        rssi_dbm: how.rssi_dbm,
+    };
+    (record, reception)
 }
 
 /// An item of the decoder with its bytes, so that the decoder is free again.
@@ -104,9 +134,12 @@ impl Station {
                 Item::Frame { offset, bytes, nested, promoted, rssi_dbm } => {
                     let Ok(frame) = DownFrame::parse(&bytes) else { continue };
                     let rssi_dbm = rssi_dbm.or_else(|| promoted.then_some(self.links[l].rssi_dbm).flatten());
-                    let heard = self.archive(l, &frame, How { nested, promoted, source, rssi_dbm }, received);
+                    let how = How { nested, promoted, source, rssi_dbm };
                     let link = &mut self.links[l];
                     link.rssi_dbm = rssi_dbm.or(link.rssi_dbm);
+                    link.last_frame = None;
+                    let Some(heard) = self.archive(l, &frame, how, received) else { continue };
+                    let link = &mut self.links[l];
                     link.last_frame = Some(LastFrame {
                         offset,
                         frame: heard.id,
@@ -137,18 +170,25 @@ impl Station {
     /// A frame that the reserve kept while storage failed: it fills the archive, it tells nothing of the present.
     pub(super) fn take_recovered(&mut self, kept: &ReservedFrame) {
         self.journal.mark_reserve_dirty();
-        let (Some(l), Ok(frame)) = (self.link_index(&kept.route.link), DownFrame::parse(&kept.bytes)) else {
-            return;
-        };
+        let Ok(frame) = DownFrame::parse(&kept.bytes) else { return };
         let at = Now { mono: crate::clock::MonoUs(0), utc: kept.received_at };
         let how = How { nested: false, promoted: false, source: kept.source, rssi_dbm: kept.rssi_dbm };
-        let heard = Heard { live: false, ..self.archive(l, &frame, how, at) };
-        self.interpret(&heard, &frame);
+        let Some(l) = self.link_index(&kept.route.link) else {
+            // The link has left the configuration since: the frame is kept all the same.
+            self.ids.frame += 1;
+            let id = FrameId(self.ids.frame);
+            let (record, reception) = rows(id, kept.route.clone(), &frame, &how, kept.received_at);
+            self.journal.push_frame(record, reception);
+            return;
+        };
+        if let Some(heard) = self.archive(l, &frame, how, at) {
+            self.interpret(&Heard { live: false, ..heard }, &frame);
+        }
     }
 
-    /// Raw frame and reception, before anything else. What was promoted is stored already, as nested.
-    fn archive(&mut self, l: usize, frame: &DownFrame<'_>, how: How, received: Now) -> Heard {
-        let How { nested, promoted, source, rssi_dbm } = how;
+    /// Raw frame and reception, before anything else. What was promoted is stored already, as nested. `None` when there
+    /// is no room for the frame: then nothing may follow from it.
+    fn archive(&mut self, l: usize, frame: &DownFrame<'_>, how: How, received: Now) -> Option<Heard> {
         let route = self.route(l);
         let known = self.known_frame(frame.bytes(), received.utc);
         let id = known.unwrap_or_else(|| {
@@ -161,51 +201,44 @@ impl Station {
             link: l,
             at: received,
             tag: frame.tag(),
-            live: source == Source::Radio,
+            live: how.source == Source::Radio,
+            from_radio: how.source == Source::Radio,
             length: frame.bytes().len(),
-            repeat: known.is_some() && !promoted,
+            repeat: known.is_some() && !how.promoted,
         };
-        let record = FrameRecord {
-            id,
-            route: route.clone(),
-            bytes: frame.bytes().into(),
-            form: frame.form(),
-            packet_type: frame.header().map(|header| header.packet_type),
-            tag: frame.tag(),
-            nested,
-            heard_at: received.utc,
-        };
-        if promoted && known.is_some() {
+        let (record, reception) = rows(id, route.clone(), frame, &how, received.utc);
+        if how.promoted && known.is_some() {
             self.journal.push(Record::Frame(record));
-            return heard;
+            return Some(heard);
         }
-        let reception =
-            ReceptionRecord { frame: id, route: route.clone(), source, received_at: received.utc, rssi_dbm };
         if known.is_some() {
-            self.journal.push(Record::Reception(reception));
-        } else {
+            self.journal.push_reception(reception);
+        } else if self.journal.push_frame(record, reception) {
             self.recent.push_back(Recent { id, at: received.utc, bytes: frame.bytes().into() });
             if self.recent.len() > RECENT_FRAMES {
                 self.recent.pop_front();
             }
-            self.journal.push_frame(record, reception);
+        } else {
+            return None;
         }
         let message = format!(
             "{}{} of {} bytes heard over {}",
             frame.packet().map_or("frame", |packet| packet.name()),
-            if nested { " (inside another frame)" } else { "" },
+            if how.nested { " (inside another frame)" } else { "" },
             frame.bytes().len(),
             route.link
         );
         self.heard_event(&heard, EventKind::FrameHeard, Level::Normal, message);
-        heard
+        Some(heard)
     }
 
     fn known_frame(&mut self, bytes: &[u8], at: UtcUs) -> Option<FrameId> {
-        while self.recent.front().is_some_and(|recent| at.0 - recent.at.0 > SAME_FRAME_US) {
+        while self.recent.front().is_some_and(|recent| at.0.saturating_sub(recent.at.0) > SAME_FRAME_US) {
             self.recent.pop_front();
         }
-        let same = |recent: &&Recent| *recent.bytes == *bytes && (at.0 - recent.at.0).abs() <= SAME_FRAME_US;
+        let same = |recent: &&Recent| {
+            *recent.bytes == *bytes && at.0.abs_diff(recent.at.0) <= SAME_FRAME_US.unsigned_abs()
+        };
         self.recent.iter().find(same).map(|recent| recent.id)
     }
 
@@ -229,7 +262,9 @@ impl Station {
         };
         let points = telemetry::points(&packet);
         if !points.is_empty() && !heard.repeat {
-            self.limits(heard, &points);
+            if heard.live {
+                self.limits(heard, &points);
+            }
             self.journal.push(Record::Telemetry(TelemetryRecord {
                 frame: heard.id,
                 route: heard.route.clone(),

@@ -8,9 +8,10 @@ use crate::port::{Effect, ReservedFrame};
 use crate::record::{Batch, FrameRecord, ReceptionRecord, Record};
 use crate::status::StorageStatus;
 
-/// Above this many waiting records, derived ones are dropped while storage fails: redecode makes them again.
+/// Above this many waiting records, derived ones are dropped: redecode makes them again.
 const DERIVED_BOUND: usize = 50_000;
-/// Above this many waiting records, raw frames find no place in memory either (the reserve has them if it had room).
+/// Above this many waiting records, raw frames find no place in memory either (the reserve has them if it had room),
+/// and nothing follows from them: a row that names a frame which is not stored would spoil its batch for ever.
 const FRAME_BOUND: usize = 100_000;
 /// How often a failed batch is tried again.
 const RETRY_US: u64 = 1_000_000;
@@ -37,7 +38,7 @@ impl Journal {
     /// Adds a record to the batch that goes out next.
     pub(super) fn push(&mut self, record: Record) -> Ticket {
         let is_derived = matches!(record, Record::Telemetry(_) | Record::ReceptionRssi(_) | Record::Event(_));
-        if is_derived && self.status.failing.is_some() && self.pending.len() >= DERIVED_BOUND {
+        if is_derived && self.pending.len() >= DERIVED_BOUND {
             self.status.derived_dropped += 1;
         } else {
             self.pending.push(record);
@@ -45,17 +46,34 @@ impl Journal {
         Ticket(self.issued + 1)
     }
 
-    /// Adds a raw frame with its reception. While storage fails it goes to the reserve as well.
-    pub(super) fn push_frame(&mut self, frame: FrameRecord, reception: ReceptionRecord) {
-        if self.status.failing.is_some() {
+    /// Adds a raw frame with its reception; false when there is no room for it. While storage fails, and when there is
+    /// no room, it goes to the reserve as well.
+    pub(super) fn push_frame(&mut self, frame: FrameRecord, reception: ReceptionRecord) -> bool {
+        let fits = !self.is_full();
+        if self.status.failing.is_some() || !fits {
             self.reserve(&frame, &reception);
-            if self.pending.len() >= FRAME_BOUND {
-                self.status.frames_lost += 1;
-                return;
-            }
         }
-        self.pending.push(Record::Frame(frame));
-        self.pending.push(Record::Reception(reception));
+        if fits {
+            self.pending.push(Record::Frame(frame));
+            self.pending.push(Record::Reception(reception));
+        } else {
+            self.status.frames_lost += 1;
+        }
+        fits
+    }
+
+    /// Adds another reception of a frame that is there already; dropped when there is no room.
+    pub(super) fn push_reception(&mut self, reception: ReceptionRecord) {
+        if self.is_full() {
+            self.status.derived_dropped += 1;
+        } else {
+            self.pending.push(Record::Reception(reception));
+        }
+    }
+
+    /// Nothing more is taken: storage has been behind for too long.
+    pub(super) fn is_full(&self) -> bool {
+        self.pending.len() >= FRAME_BOUND
     }
 
     /// The ticket for everything that was pushed so far.
@@ -121,9 +139,13 @@ impl Journal {
         is_news
     }
 
-    /// What was put into the reserve is all in the database: it may be emptied.
+    /// What was put into the reserve is all in the database: it may be emptied. Never in this life once a frame found
+    /// a place in the reserve alone: the next start brings it back.
     pub(super) fn take_reserve_clear(&mut self) -> bool {
-        self.status.failing.is_none() && self.is_settled() && std::mem::take(&mut self.reserve_dirty)
+        self.status.failing.is_none()
+            && self.status.frames_lost == 0
+            && self.is_settled()
+            && std::mem::take(&mut self.reserve_dirty)
     }
 
     /// Frames came back from the reserve: it is to be emptied once they are durable.
@@ -146,14 +168,14 @@ impl Journal {
 
     /// Puts every raw frame that waits into the reserve.
     fn reserve_waiting(&mut self) {
-        let mut pairs = Vec::new();
+        let mut pairs: Vec<(FrameRecord, Option<ReceptionRecord>)> = Vec::new();
         let batch = self.in_flight.iter().flat_map(|batch| batch.records.iter());
         for record in batch.chain(&self.pending) {
             match record {
                 Record::Frame(frame) => pairs.push((frame.clone(), None)),
                 Record::Reception(reception) => {
-                    if let Some(pair) = pairs.iter_mut().rev().find(|(frame, _)| frame.id == reception.frame)
-                    {
+                    // The first reception of a frame follows it at once.
+                    if let Some(pair) = pairs.last_mut().filter(|(frame, _)| frame.id == reception.frame) {
                         pair.1.get_or_insert_with(|| reception.clone());
                     }
                 }
