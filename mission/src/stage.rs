@@ -70,17 +70,21 @@ impl Stage {
     pub const fn may_be_followed_by(self, next: Self, idempotent: bool) -> bool {
         match self {
             // An idempotent command that waits to be repeated may still be answered for its earlier attempt; and when
-            // it is withdrawn or out of time, whether that attempt was obeyed is unknown.
+            // it is withdrawn or out of time, whether that attempt was obeyed is unknown. Unknown is also what waited
+            // in a database that went back: nobody can tell what became of it in the time that was lost.
             Self::Queued => {
-                matches!(next, Self::Sealed | Self::Expired | Self::Cancelled | Self::Failed)
-                    || (idempotent && matches!(next, Self::Answered | Self::Rejected | Self::Unknown))
+                matches!(next, Self::Sealed | Self::Expired | Self::Cancelled | Self::Failed | Self::Unknown)
+                    || (idempotent && matches!(next, Self::Answered | Self::Rejected))
             }
-            Self::Sealed => {
-                matches!(
-                    next,
-                    Self::Radiating | Self::Expired | Self::Cancelled | Self::Failed | Self::Queued
-                ) || (idempotent && matches!(next, Self::Unknown))
-            }
+            Self::Sealed => matches!(
+                next,
+                Self::Radiating
+                    | Self::Expired
+                    | Self::Cancelled
+                    | Self::Failed
+                    | Self::Queued
+                    | Self::Unknown
+            ),
             // Back to the queue only when the radio is certain that nothing left the antenna.
             Self::Radiating => matches!(
                 next,

@@ -61,10 +61,10 @@ impl Contact {
     /// Takes up the rhythm of the last life.
     pub(super) fn restore(&mut self, heard_at: UtcUs, now: Now, delay_us: u64) {
         self.heartbeat_at = Some(heard_at);
-        let ago = u64::try_from(now.utc.0 - heard_at.0).unwrap_or(0).saturating_add(delay_us);
+        let ago = u64::try_from(now.utc.0.saturating_sub(heard_at.0)).unwrap_or(0).saturating_add(delay_us);
         // Whole periods forward, so that a young monotonic scale can express it.
         let periods = ago / self.period_us + 1;
-        self.rhythm = Some(now.mono.plus(periods * self.period_us - ago));
+        self.rhythm = Some(now.mono.plus(periods.saturating_mul(self.period_us).saturating_sub(ago)));
     }
 
     /// A frame of the satellite was received live.
@@ -123,23 +123,22 @@ impl Contact {
 
     /// When it counts as lost if nothing more is heard.
     pub(super) fn closes_at(&self) -> Option<MonoUs> {
-        self.heard.map(|heard| heard.mono.plus(self.period_us / 2 * CONTACT_HALF_PERIODS))
+        self.heard.map(|heard| heard.mono.plus((self.period_us / 2).saturating_mul(CONTACT_HALF_PERIODS)))
     }
 
     /// The heartbeat slot, guards included, that ends after `now` first.
     pub(super) fn next_slot(&self, now: MonoUs) -> Option<Slot> {
         let rhythm = self.rhythm?;
         let length = self.frame_us + GUARD_AFTER_US;
-        // The earliest heartbeat whose slot has not ended.
-        let past = now.0.saturating_sub(rhythm.0.saturating_add(length));
-        let mut start = rhythm.plus(past / self.period_us * self.period_us);
-        while start.plus(length) <= now {
-            start = start.plus(self.period_us);
-        }
-        // The rhythm may lie ahead of now by periods (taken up from the last life).
-        while start.0 >= self.period_us && MonoUs(start.0 - self.period_us).plus(length) > now {
-            start = MonoUs(start.0 - self.period_us);
-        }
+        // The earliest heartbeat whose slot has not ended. The rhythm may lie ahead of now by periods (taken up from the
+        // last life) or behind it.
+        let end = rhythm.0.saturating_add(length);
+        let start = if end <= now.0 {
+            rhythm.plus(((now.0 - end) / self.period_us + 1).saturating_mul(self.period_us))
+        } else {
+            let back = ((end - now.0 - 1) / self.period_us).min(rhythm.0 / self.period_us);
+            MonoUs(rhythm.0 - back * self.period_us)
+        };
         Some(Slot { start: MonoUs(start.0.saturating_sub(GUARD_BEFORE_US)), end: start.plus(length) })
     }
 

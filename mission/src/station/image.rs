@@ -35,9 +35,9 @@ pub(super) struct Assembly {
     data: Vec<u8>,
 }
 
-/// Whether chunks and size fit together, and the index can name every chunk.
+/// Whether there are bytes, chunks and size fit together, and the index can name every chunk.
 pub(super) fn is_usable(info: &ImageInfo) -> bool {
-    info.is_consistent() && info.chunks <= 1 << 16
+    info.size_bytes > 0 && info.is_consistent() && info.chunks <= 1 << 16
 }
 
 impl Assembly {
@@ -59,6 +59,7 @@ impl Assembly {
         }
         for index in &snapshot.conflicts {
             assembly.note_conflict(*index);
+            assembly.versions += 1;
         }
         assembly
     }
@@ -83,7 +84,7 @@ impl Assembly {
             Fit::Same
         } else {
             self.note_conflict(index);
-            self.versions += 1;
+            self.versions = self.versions.saturating_add(1);
             Fit::Conflict { keep: self.versions <= CONFLICTS_KEPT }
         }
     }

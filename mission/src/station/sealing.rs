@@ -10,6 +10,9 @@ use crate::snapshot::{KeySnapshot, Witness};
 /// A clock further ahead of the last counter than this needs somebody who vouches for it.
 const UNVOUCHED_LEAP_US: u64 = 48 * 3600 * 1_000_000;
 
+/// The database holds counters as signed integers: above this there is none.
+const COUNTER_MAX: Counter = Counter(i64::MAX as u64);
+
 /// Why nothing is sealed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Lock {
@@ -102,8 +105,9 @@ impl Sealer {
     pub(super) fn lock(&self, vouched: bool) -> Option<Lock> {
         match &self.lock {
             Some(lock) => Some(lock.clone()),
-            None if self.last.is_none() && !vouched => Some(Lock::NoVoucher),
-            None if self.last == Some(Counter(u64::MAX)) => Some(Lock::Exhausted),
+            // A floor of 0 (confirmed where nothing was known) is no counter.
+            None if self.last.is_none_or(|last| last == Counter(0)) && !vouched => Some(Lock::NoVoucher),
+            None if self.last >= Some(COUNTER_MAX) => Some(Lock::Exhausted),
             None => None,
         }
     }
@@ -166,7 +170,17 @@ impl Sealer {
             CounterRule::Time if vouched => Some(Counter(u64::try_from(utc.0).unwrap_or(0))),
             _ => None,
         };
-        self.last.max(self.witness).max(clock).unwrap_or(Counter(0))
+        self.last.max(self.witness).max(clock).unwrap_or(Counter(0)).min(COUNTER_MAX)
+    }
+
+    /// Whether this counter is the newest one, so that a frame sealed with it may still go out.
+    pub(super) fn is_newest(&self, counter: Counter) -> bool {
+        self.last == Some(counter)
+    }
+
+    /// The database is behind the witness: what happened in between is lost.
+    pub(super) fn database_went_back(&self) -> bool {
+        matches!(self.lock, Some(Lock::WitnessAhead { .. }))
     }
 }
 
