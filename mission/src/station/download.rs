@@ -5,7 +5,8 @@ use protocol::{ChunkRange, ChunkRanges, RANGE_MAX, Telecommand};
 
 use super::gate::{Need, Wait};
 use super::outcome::mono_of;
-use super::satellite::Command;
+use super::satellite::{Before, Command};
+use super::uplink::REFUSED_US;
 use super::{About, Station};
 use crate::clock::{MonoUs, Now};
 use crate::cover::{Cost, Range, cheapest_cover, exact_runs};
@@ -173,6 +174,8 @@ impl Station {
             attempt: 0,
             tag: None,
             on_air_at: None,
+            on_air_mono: None,
+            before: Before::default(),
             sealed: None,
             not_before: MonoUs(0),
         };
@@ -213,23 +216,30 @@ impl Station {
         }
     }
 
-    /// The satellite said that it has no image.
-    pub(super) fn download_without_image(&mut self, now: Now, s: usize) {
+    /// The satellite has no image, or none that can be used.
+    pub(super) fn download_without_image(&mut self, now: Now, s: usize, why: &str) {
         let Some(download) = &mut self.satellites[s].download else { return };
         download.ask_info = true;
         download.no_image += 1;
         download.not_before = now.mono.plus(NO_IMAGE_RETRY_US);
         if download.no_image >= NO_IMAGE_TIMES {
-            self.end_download(now, s, DownloadState::Failed, "the satellite has no image");
+            self.end_download(now, s, DownloadState::Failed, why);
         }
     }
 
-    /// A request for chunks was refused: what the image is must be asked again.
-    pub(super) fn download_refused(&mut self, s: usize, id: CommandId) {
+    /// A request of the download was refused. Chunks: what the image is must be asked again, after a while. What the
+    /// image is: as if there were none.
+    pub(super) fn download_refused(&mut self, now: Now, s: usize, id: CommandId) {
         let sat = &mut self.satellites[s];
-        let asked_by = sat.commands.get(&id).and_then(|c| c.record.download);
-        if let Some(download) = sat.download.as_mut().filter(|d| Some(d.record.id) == asked_by) {
+        let Some(command) = sat.commands.get(&id) else { return };
+        let asked_by = command.record.download;
+        let asked_info = command.record.telecommand == Telecommand::GetImageInfo;
+        let Some(download) = sat.download.as_mut().filter(|d| Some(d.record.id) == asked_by) else { return };
+        if asked_info {
+            self.download_without_image(now, s, "the satellite does not tell what its image is");
+        } else {
             download.ask_info = true;
+            download.not_before = now.mono.plus(REFUSED_US);
         }
     }
 

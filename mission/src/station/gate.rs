@@ -46,14 +46,18 @@ impl Station {
         if let Some(why) = self.journal.failing() {
             return Err(Wait { why: format!("storage fails: {why}").into(), until: None });
         }
-        self.seal_gate(sat, now)?;
+        // A station that transmits hears nothing, over whichever of its radios.
+        if self.links.iter().any(|link| link.on_air.is_some()) {
+            return Err(wait("something of ours is on the air", None));
+        }
+        self.seal_gate(sat)?;
         link_gate(link, now, need.gate)?;
         contact_gate(sat, now, need.gate)?;
         silence_gate(sat, link, now)?;
         los_gate(sat, link, now, need.answer_us)
     }
 
-    fn seal_gate(&self, sat: &Satellite, _now: Now) -> Result<(), Wait> {
+    fn seal_gate(&self, sat: &Satellite) -> Result<(), Wait> {
         match &sat.sealer {
             None => Err(wait("this satellite has no key", None)),
             Some(sealer) => match sealer.lock(self.is_vouched()) {
@@ -73,9 +77,6 @@ fn link_gate(link: &Link, now: Now, gate: Gate) -> Result<(), Wait> {
     }
     if link.state != LinkState::Ok {
         return Err(Wait { why: format!("the link is {}", link.state.name()).into(), until: None });
-    }
-    if link.on_air.is_some() {
-        return Err(wait("something of ours is on the air", None));
     }
     let listened = link.up_since.map_or(0, |since| now.mono.since(since));
     if gate == Gate::Blind && listened < LISTEN_FIRST_US {

@@ -1,6 +1,8 @@
 //! What operators want: checked whole before anything is stored, durable before it is answered.
 
-use super::satellite::{Download, Exchange, Step};
+use protocol::{RANGE_MAX, Telecommand};
+
+use super::satellite::{Command, Download, Exchange, Step};
 use super::{About, Station};
 use crate::clock::{MonoUs, Now};
 use crate::id::{CommandId, DownloadId, LinkId, Principal, SatelliteId};
@@ -23,6 +25,9 @@ impl Station {
         let result = match self.journal.failing() {
             Some(why) => Err(Refusal::Storage(why.to_owned())),
             None if self.stopping => Err(Refusal::Stopping),
+            None if self.journal.is_full() => {
+                Err(Refusal::Storage("it is too far behind to take anything more".to_owned()))
+            }
             None => self.carry_out(now, &who, envelope.intent),
         };
         match result {
@@ -123,8 +128,17 @@ impl Station {
             sat.sealer.as_ref().map(|sealer| sealer.id).ok_or_else(|| Refusal::NoKey(sat.id.clone()))?;
         let telecommand = wanted.telecommand;
         telecommand.validate().map_err(|error| Refusal::Argument(error.to_string()))?;
-        if matches!(telecommand, protocol::Telecommand::GetImageRanges(_)) && !sat.profile.ranges {
+        if matches!(telecommand, Telecommand::GetImageRanges(_)) && !sat.profile.ranges {
             return Err(Refusal::NotInProfile(telecommand.name()));
+        }
+        let asked: u32 = match &telecommand {
+            Telecommand::GetImageChunk { count, .. } => u32::from(*count),
+            Telecommand::GetImageRanges(ranges) => ranges.ranges.iter().map(|r| u32::from(r.count)).sum(),
+            _ => 0,
+        };
+        if asked > u32::from(RANGE_MAX) {
+            let why = format!("count: at most {RANGE_MAX} chunks at a time, the satellite is deaf meanwhile");
+            return Err(Refusal::Argument(why));
         }
         if telecommand.is_critical() && wanted.confirmation.as_deref() != Some(telecommand.name()) {
             return Err(Refusal::NeedsConfirmation(telecommand.name()));
@@ -241,6 +255,18 @@ impl Station {
         let found = self.satellites.iter().position(|sat| sat.download.as_ref().is_some_and(is_it));
         let s = found.ok_or(Refusal::UnknownDownload(id))?;
         self.audit(now.utc, who, "download.cancel", format!("download {id}"));
+        // What it asked for and is not marked yet is not radiated any more; what is marked stops at the hand-over.
+        let sat = &mut self.satellites[s];
+        let of_it =
+            |c: &Command| c.record.download == Some(id) && matches!(c.stage, Stage::Queued | Stage::Sealed);
+        let requests: Vec<CommandId> =
+            sat.commands.values().filter(|c| of_it(c)).map(|c| c.record.id).collect();
+        for request in requests {
+            if self.satellites[s].outstanding() == Some(request) {
+                self.satellites[s].exchange = Exchange::Idle;
+            }
+            self.give_up(now, s, request, Stage::Cancelled, who, "its download was withdrawn");
+        }
         self.end_download(now, s, DownloadState::Cancelled, &format!("{who} withdrew it"));
         Ok(Accepted::DownloadCancelled(id))
     }

@@ -3,6 +3,7 @@
 use protocol::Telecommand;
 
 use super::intake::Heard;
+use super::satellite::{Command, Exchange, Satellite};
 use super::{About, Station};
 use crate::clock::{MonoUs, Now, UtcUs};
 use crate::id::{CommandId, FrameId, Principal};
@@ -12,6 +13,10 @@ use crate::stage::Stage;
 
 /// An unknown outcome may be settled by telemetry for this long; then the command is forgotten (the archive keeps it).
 const UNKNOWN_KEPT_US: i64 = 24 * 3_600 * 1_000_000;
+/// Of the machine's own requests nothing but a late answer can tell more: microseconds.
+const REQUEST_KEPT_US: i64 = 300_000_000;
+/// So many unknown outcomes are kept for telemetry to settle; the oldest go first.
+const UNKNOWN_MAX: usize = 256;
 /// Slack when uptime is held against the clock.
 const UPTIME_SLACK_US: i64 = 2_000_000;
 /// A satellite that obeys a Reset has booted within this time.
@@ -103,15 +108,12 @@ impl Station {
     /// What waits too long expires, and what stayed unknown for a day is left to the archive.
     pub(super) fn expire(&mut self, now: Now, s: usize) {
         let sat = &mut self.satellites[s];
-        let forgotten =
-            |stage: Stage, at: UtcUs| stage == Stage::Unknown && now.utc.0 - at.0 > UNKNOWN_KEPT_US;
-        sat.commands.retain(|_, c| !forgotten(c.stage, c.stage_at));
+        sat.forget_unknown(now);
         let in_hand = sat.outstanding();
         let mut expired = Vec::new();
         let mut next: Option<i64> = None;
         for command in sat.commands.values() {
-            let waits =
-                matches!(command.stage, Stage::Queued | Stage::Sealed) && in_hand != Some(command.record.id);
+            let waits = matches!(command.stage, Stage::Queued | Stage::Sealed);
             match command.record.expires_at {
                 Some(at) if waits && at <= now.utc => expired.push(command.record.id),
                 Some(at) if waits => next = Some(next.map_or(at.0, |n| n.min(at.0))),
@@ -123,6 +125,10 @@ impl Station {
         }
         let me = self.me.clone();
         for id in expired {
+            // Sealed, and on its way to the radio: it stops here. Once marked it is `radiating`, and no part of this.
+            if in_hand == Some(id) {
+                self.satellites[s].exchange = Exchange::Idle;
+            }
             self.give_up(now, s, id, Stage::Expired, &me, "its time ran out before it could be radiated");
         }
     }
@@ -167,22 +173,24 @@ impl Station {
         let now = heard.at.utc;
         let mut proofs = Vec::new();
         for command in sat.commands.values() {
-            let Some(on_air_at) = command.on_air_at else { continue };
-            if !matches!(command.stage, Stage::Radiated | Stage::Unknown) || on_air_at >= now {
+            let Some(since_us) = command.since_on_air_us(heard.at) else { continue };
+            if !matches!(command.stage, Stage::Radiated | Stage::Unknown) || since_us <= 0 {
                 continue;
             }
-            let since_us = now.0 - on_air_at.0;
             match command.record.telecommand {
                 Telecommand::Reset => {
                     let uptime_us = i64::from(uptime_ms) * 1_000;
                     let wraps = sat.uptime.is_some_and(|(at, before)| {
-                        i64::from(before) + (now.0 - at.0) / 1_000 + UPTIME_SLACK_US / 1_000
+                        i64::from(before)
+                            .saturating_add(now.0.saturating_sub(at.0) / 1_000 + UPTIME_SLACK_US / 1_000)
                             > i64::from(u32::MAX)
                     });
                     // How long after the radiation the satellite booted; negative: it has run since before.
-                    let booted_after_us = since_us - uptime_us;
+                    let booted_after_us = since_us.saturating_sub(uptime_us);
                     if wraps {
                         // The 49.7-day wrap looks like a reset: it proves nothing.
+                    } else if booted_after_us < -UPTIME_SLACK_US && since_us <= 2 * UPTIME_SLACK_US {
+                        // This heartbeat may have waited in the satellite's radio since before the reset.
                     } else if booted_after_us < -UPTIME_SLACK_US {
                         let why =
                             format!("the heartbeat shows an uptime of {} s: no reset", uptime_ms / 1_000);
@@ -203,6 +211,29 @@ impl Station {
         for (id, stage, why) in proofs {
             self.stage(heard.at, s, id, stage, &why, Some(heard.id));
             self.satellites[s].settling.retain(|w| w.command != id);
+        }
+    }
+}
+
+impl Satellite {
+    /// What stayed unknown is left to the archive after a day, or when there is too much of it. A clock that steps leaves
+    /// nothing behind for ever: what lies a day ahead goes as well.
+    fn forget_unknown(&mut self, now: Now) {
+        let kept_us = |c: &Command| match c.record.download {
+            Some(_) => REQUEST_KEPT_US.unsigned_abs(),
+            None => UNKNOWN_KEPT_US.unsigned_abs(),
+        };
+        let is_over =
+            |c: &Command| c.stage == Stage::Unknown && now.utc.0.abs_diff(c.stage_at.0) > kept_us(c);
+        self.commands.retain(|_, c| !is_over(c));
+        let unknown = self.commands.values().filter(|c| c.stage == Stage::Unknown).count();
+        let mut surplus = unknown.saturating_sub(UNKNOWN_MAX);
+        if surplus > 0 {
+            self.commands.retain(|_, c| {
+                let goes = c.stage == Stage::Unknown && surplus > 0;
+                surplus -= usize::from(goes);
+                !goes
+            });
         }
     }
 }

@@ -1,7 +1,8 @@
 //! What a packet changes: contact, limits, images, and the command that it answers.
 
 use protocol::{
-    Answer, Downlink, ErrorCode, Heartbeat, ImageChunk, ImageInfo, RequestTag, Telecommand, down_type,
+    Answer, Downlink, ErrorCode, FRAME_LEN, Heartbeat, ImageChunk, ImageInfo, RequestTag, Telecommand,
+    down_type,
 };
 
 use super::image::{Assembly, Fit, is_usable};
@@ -26,7 +27,10 @@ impl Station {
         let delay_us = timing.delivery_us(heard.length) + timing.frame_us(heard.length);
         let sat = &mut self.satellites[s];
         sat.contact.heard(heard.at);
-        if packet_type == down_type::HEARTBEAT && heard.tag.is_none() {
+        // Without tags the answer to a SetTimestamp looks like a heartbeat of the rhythm, which it does not move.
+        let is_answer = !sat.profile.tags
+            && matches!(&sat.exchange, Exchange::Awaiting(a) if a.answer == Answer::One(down_type::HEARTBEAT));
+        if packet_type == down_type::HEARTBEAT && heard.tag.is_none() && !is_answer {
             sat.contact.heartbeat(heard.at, delay_us);
         }
         if packet_type != down_type::IMAGE_CHUNK {
@@ -55,6 +59,10 @@ impl Station {
     fn answers(&mut self, heard: &Heard, s: usize, packet: &Downlink) -> Option<CommandId> {
         let sat = &self.satellites[s];
         if sat.profile.tags && heard.tag.is_none() {
+            if matches!(packet, Downlink::ImageChunk(_)) {
+                // Chunks by the satellite's own schedule: the next one follows soon.
+                self.let_it_finish(heard, s);
+            }
             return None;
         }
         let expected = |answer: Answer, tag: RequestTag| {
@@ -64,11 +72,14 @@ impl Station {
                 (Answer::Chunks, Downlink::ImageChunk(_)) => true,
                 _ => false,
             };
-            is_kind && (!sat.profile.tags || heard.tag == Some(tag))
+            // Without tags an Error is the answer to a request that has one: a Reset is followed by an Error of the
+            // satellite's own accord, which says nothing of it.
+            is_kind && if sat.profile.tags { heard.tag == Some(tag) } else { answer != Answer::None }
         };
         let in_exchange = match &sat.exchange {
             Exchange::Awaiting(awaited) if expected(awaited.answer, awaited.tag) => Some(awaited.command),
-            Exchange::OnAir { frame, .. } => sat
+            // The radio's word may come after the answer; without tags, what was heard before is not told from that.
+            Exchange::OnAir { frame, .. } if sat.profile.tags => sat
                 .commands
                 .get(&frame.command)
                 .filter(|c| expected(c.record.telecommand.answer(), frame.tag))
@@ -84,7 +95,9 @@ impl Station {
             let tag = heard.tag.filter(|_| sat.profile.tags)?;
             let unknown =
                 sat.commands.values().rev().filter(|c| c.stage == Stage::Unknown || c.stage == Stage::Queued);
-            let lately = |c: &&Command| c.on_air_at.is_some_and(|at| heard.at.utc.0 - at.0 < LATE_ANSWER_US);
+            let lately = |c: &&Command| {
+                c.since_on_air_us(heard.at).is_some_and(|us| (0..LATE_ANSWER_US).contains(&us))
+            };
             unknown
                 .filter(lately)
                 .filter(|c| c.tag == Some(tag) && expected(c.record.telecommand.answer(), tag))
@@ -93,9 +106,7 @@ impl Station {
         };
         let Some(command) = in_exchange.or_else(settling).or_else(late) else {
             // An answer to a request that we do not know (another life's, another ground's): let it finish.
-            let quiet = self.links[heard.link].chunk_period_us() * 5 / 2;
-            let contact = &mut self.satellites[s].contact;
-            contact.quiet_until = contact.quiet_until.max(heard.at.mono.plus(quiet));
+            self.let_it_finish(heard, s);
             return None;
         };
         if let Downlink::ImageChunk(chunk) = packet {
@@ -104,6 +115,13 @@ impl Station {
         self.answered(heard, s, command, packet);
         self.advance_answer(heard, s, command, packet);
         Some(command)
+    }
+
+    /// The satellite is sending something that takes more than one frame, perhaps: nothing of ours for so long.
+    fn let_it_finish(&mut self, heard: &Heard, s: usize) {
+        let quiet = self.links[heard.link].chunk_period_us() * 5 / 2;
+        let contact = &mut self.satellites[s].contact;
+        contact.quiet_until = contact.quiet_until.max(heard.at.mono.plus(quiet));
     }
 
     /// The stage that an answer proves.
@@ -120,7 +138,8 @@ impl Station {
             packet => (Stage::Answered, format!("{} with its tag was heard", packet.name())),
         };
         if stage == Stage::Rejected {
-            self.download_refused(s, command);
+            self.satellites[s].captures.remove(&command);
+            self.download_refused(heard.at, s, command);
         }
         self.stage(heard.at, s, command, stage, &why, Some(heard.id));
     }
@@ -138,8 +157,10 @@ impl Station {
         let link = &links[awaited.link];
         let after = match packet {
             Downlink::ImageChunk(chunk) => {
-                awaited.got += 1;
-                awaited.chunks_after(chunk.index.0).unwrap_or(0)
+                awaited.got = awaited.got.saturating_add(1);
+                // One that was not asked for says nothing of what is still to come.
+                let Some(after) = awaited.chunks_after(chunk.index.0) else { return };
+                after
             }
             Downlink::ImageInfo(info) if !info.exists && matches!(awaited.answer, Answer::One(_)) => {
                 // The answer to a CaptureImage comes when the picture is taken; one to GetImageInfo is the answer.
@@ -151,7 +172,7 @@ impl Station {
             sat.exchange = Exchange::Idle;
         } else if awaited.answer == Answer::Chunks {
             let stretch = after * link.chunk_period_us();
-            let heartbeat = link.config.timing.frame_us(133) * sat.contact.heartbeats_within(stretch);
+            let heartbeat = link.config.timing.frame_us(FRAME_LEN) * sat.contact.heartbeats_within(stretch);
             awaited.deadline = heard.at.mono.plus(stretch + heartbeat + link.margin_us());
         }
     }
@@ -191,7 +212,7 @@ impl Station {
     fn image_info(&mut self, heard: &Heard, s: usize, info: &ImageInfo, answers: Option<CommandId>) {
         if !info.exists {
             if answers.is_some() {
-                self.download_without_image(heard.at, s);
+                self.download_without_image(heard.at, s, "the satellite has no image");
             }
             return;
         }
@@ -199,12 +220,33 @@ impl Station {
             let message =
                 format!("ImageInfo is not used: {} chunks do not fit {} bytes", info.chunks, info.size_bytes);
             self.heard_event(heard, EventKind::ImageDeclared, Level::Distress, message);
+            if answers.is_some() {
+                self.download_without_image(
+                    heard.at,
+                    s,
+                    "what the satellite says of its image makes no sense",
+                );
+            }
             return;
         }
         let sat = &mut self.satellites[s];
-        let is_new = sat.capture_pending || sat.image.as_ref().is_none_or(|image| !image.is(info));
-        if is_new {
-            sat.capture_pending = false;
+        let differs = sat.image.as_ref().is_none_or(|image| !image.is(info));
+        // What comes from a file, or from before a failure of the storage, must not displace what is newer.
+        let is_news = heard.live
+            || (heard.from_radio
+                && sat.image.as_ref().is_none_or(|image| image.record.declared_at < heard.at.utc));
+        if !is_news {
+            if differs {
+                let message =
+                    "ImageInfo tells of another image, but not from our radio now: kept raw".to_owned();
+                self.heard_event(heard, EventKind::ImageDeclared, Level::Watch, message);
+            }
+            return;
+        }
+        if differs || (heard.live && !sat.captures.is_empty()) {
+            if heard.live {
+                sat.captures.clear();
+            }
             self.ids.image += 1;
             let record = ImageRecord {
                 id: ImageId(self.ids.image),
@@ -240,6 +282,12 @@ impl Station {
             self.heard_event(heard, EventKind::ChunkReceived, Level::Watch, message);
             return;
         };
+        if !heard.live && heard.from_radio && heard.at.utc < image.record.declared_at {
+            let message =
+                format!("chunk {index} was heard before image {} was declared: kept raw", image.record.id);
+            self.heard_event(heard, EventKind::ChunkReceived, Level::Watch, message);
+            return;
+        }
         let was_complete = image.is_complete();
         let fit = image.fit(index, &chunk.data);
         let id = image.record.id;

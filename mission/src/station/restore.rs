@@ -7,7 +7,7 @@ use super::image::Assembly;
 use super::journal::Journal;
 use super::link::Link;
 use super::outcome::mono_of;
-use super::satellite::{Command, Download, Exchange, Satellite, Settling};
+use super::satellite::{Before, Command, Download, Exchange, Satellite, Settling};
 use super::sealing::Sealer;
 use super::{About, Entropy, Station};
 use crate::clock::{MonoUs, Now};
@@ -89,11 +89,12 @@ fn satellite(
     let commands: BTreeMap<CommandId, Command> =
         left.into_iter().flat_map(|l| &l.commands).map(|c| (c.record.id, command(c))).collect();
     let image = left.and_then(|l| l.image.as_ref()).map(Assembly::restore);
-    let capture_pending = commands.values().any(|c| {
+    let may_have_captured = |c: &&Command| {
         matches!(c.record.telecommand, protocol::Telecommand::CaptureImage { .. })
             && matches!(c.stage, Stage::Radiating | Stage::Radiated | Stage::Unknown)
-            && image.as_ref().is_none_or(|image| image.record.declared_at < c.stage_at)
-    });
+            && c.on_air_at.is_some_and(|at| image.as_ref().is_none_or(|image| image.record.declared_at < at))
+    };
+    let captures = commands.values().filter(may_have_captured).map(|c| c.record.id).collect();
     let download = left.and_then(|l| l.downloads.last()).map(|record| Download {
         ask_info: record.image.is_none() || record.image != image.as_ref().map(|image| image.record.id),
         record: record.clone(),
@@ -114,7 +115,7 @@ fn satellite(
         exchange: Exchange::Idle,
         settling: Vec::new(),
         image,
-        capture_pending,
+        captures,
         download,
         last_tag: left.and_then(|l| l.last_tag),
         uptime: left.and_then(|l| l.heartbeat).map(|(_, at, uptime)| (at, uptime)),
@@ -124,13 +125,20 @@ fn satellite(
 }
 
 fn command(found: &CommandSnapshot) -> Command {
+    // What waits and must not be repeated was never radiated: a `radiating` before that was taken back by the radio.
+    let waits = matches!(found.stage, Stage::Queued | Stage::Sealed);
+    let is_first =
+        !found.record.telecommand.is_idempotent() || (found.stage == Stage::Sealed && found.attempt <= 1);
+    let on_air_at = found.on_air_at.filter(|_| !(waits && is_first));
     Command {
         record: found.record.clone(),
         stage: found.stage,
         stage_at: found.stage_at,
         attempt: found.attempt,
         tag: found.sealed.as_ref().map(|sealed| sealed.tag),
-        on_air_at: found.on_air_at,
+        on_air_at,
+        on_air_mono: None,
+        before: Before { on_air_at, ..Before::default() },
         sealed: found.sealed.clone().filter(|_| found.stage == Stage::Sealed),
         not_before: MonoUs(0),
     }
@@ -175,15 +183,34 @@ impl Station {
         let Some(command) = self.satellites[s].commands.get(&id) else { return };
         let (stage, stage_at, tag) = (command.stage, command.stage_at, command.tag);
         let telecommand = command.record.telecommand.clone();
-        let Some(l) = self.link_index(&command.record.route.link) else { return };
+        let is_idempotent = telecommand.is_idempotent();
+        let (is_request, is_sealed) = (command.record.download.is_some(), stage == Stage::Sealed);
+        if matches!(stage, Stage::Queued | Stage::Sealed) {
+            let went_back = self.satellites[s].sealer.as_ref().is_some_and(Sealer::database_went_back);
+            if went_back && !is_idempotent {
+                let why = "the database went back: it may have been radiated in the time that was lost";
+                self.stage(now, s, id, Stage::Unknown, why, None);
+            } else if is_request && !is_sealed {
+                let me = self.me.clone();
+                self.give_up(now, s, id, Stage::Cancelled, &me, "what is missing is asked for anew");
+            }
+            return;
+        }
         if !matches!(stage, Stage::Radiating | Stage::Radiated) {
             return;
         }
+        let Some(l) = self.link_index(&command.record.route.link) else {
+            // Its link has left the configuration: nothing of it will be heard.
+            self.unanswered(now, s, id, "its link is not in the configuration any more");
+            return;
+        };
         // The satellite may be answering at this moment.
         let answer_us = self.answer_us(s, l, &telecommand) + self.links[l].margin_us();
         let send_us = if stage == Stage::Radiating { self.links[l].config.timing.uplink_us() } else { 0 };
         let total = i64::try_from(answer_us + send_us).unwrap_or(i64::MAX);
-        let deadline = mono_of(now, stage_at.plus(total));
+        // However the clock stepped meanwhile: no later than if it had been radiated now.
+        let latest = |us: u64| now.mono.plus(us);
+        let deadline = mono_of(now, stage_at.plus(total)).min(latest(answer_us + send_us));
         let sat = &mut self.satellites[s];
         sat.contact.quiet_until = sat.contact.quiet_until.max(deadline.min(now.mono.plus(180_000_000)));
         if stage == Stage::Radiating {
@@ -192,7 +219,7 @@ impl Station {
         }
         let Some(tag) = tag else { return };
         let answer = telecommand.answer();
-        let settle = mono_of(now, stage_at).plus(3 * sat.profile.heartbeat_period_us);
+        let settle = latest(sat.profile.heartbeat_period_us.saturating_mul(3));
         let deadline = if answer == protocol::Answer::None { settle } else { deadline };
         sat.settling.push(Settling { command: id, tag, answer, busy_until: None, deadline });
     }

@@ -1,6 +1,6 @@
 //! One satellite as the engine sees it: its commands, its exchange, its image.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use protocol::{Answer, Counter, RequestTag, Telecommand};
@@ -9,7 +9,7 @@ use super::contact::Contact;
 use super::image::Assembly;
 use super::journal::Ticket;
 use super::sealing::Sealer;
-use crate::clock::{MonoUs, UtcUs};
+use crate::clock::{MonoUs, Now, UtcUs};
 use crate::config::Profile;
 use crate::id::{CommandId, SatelliteId, TxId};
 use crate::limits::LimitState;
@@ -28,16 +28,70 @@ pub(super) struct Command {
     pub(super) tag: Option<RequestTag>,
     /// When the newest attempt left the antenna, or may have.
     pub(super) on_air_at: Option<UtcUs>,
+    /// The same on the scale that never steps; `None` when that was in another life.
+    pub(super) on_air_mono: Option<MonoUs>,
+    /// What tag and time on the air were before the newest attempt, should nothing of it be radiated.
+    pub(super) before: Before,
     /// Sealed in the last life and never handed over: it goes on with the same bytes.
     pub(super) sealed: Option<SealedSnapshot>,
     /// Not tried again before this.
     pub(super) not_before: MonoUs,
 }
 
+/// What was known of the attempts before the newest one.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Before {
+    pub(super) tag: Option<RequestTag>,
+    pub(super) on_air_at: Option<UtcUs>,
+    pub(super) on_air_mono: Option<MonoUs>,
+}
+
 impl Command {
+    /// What is repeated is a request whose answer was lost: one without an answer has none to lose, and its silence may
+    /// be its success.
     pub(super) fn may_repeat(&self) -> bool {
-        self.record.telecommand.is_idempotent() && self.attempt < self.record.attempts_allowed
+        self.record.telecommand.is_idempotent()
+            && self.record.telecommand.answer() != Answer::None
+            && self.attempt < self.record.attempts_allowed
     }
+
+    /// The newest attempt is on the air, or may be.
+    pub(super) fn goes_on_air(&mut self, now: Now) {
+        (self.on_air_at, self.on_air_mono) = (Some(now.utc), Some(now.mono));
+    }
+
+    /// Microseconds from the radiation of the newest attempt to `now`, negative when that lies before it. Measured on
+    /// the scale that never steps, if it was in this life.
+    pub(super) fn since_on_air_us(&self, now: Now) -> Option<i64> {
+        let signed = |us: u64| i64::try_from(us).unwrap_or(i64::MAX);
+        match (self.on_air_mono, self.on_air_at) {
+            (Some(at), _) => Some(signed(now.mono.since(at)) - signed(at.since(now.mono))),
+            (None, Some(at)) => Some(now.utc.0.saturating_sub(at.0)),
+            (None, None) => None,
+        }
+    }
+}
+
+/// What a command sets, as a number for each thing that holds one value: of two commands with the same number, the one
+/// that was radiated last is meant to hold.
+pub(super) fn setting(telecommand: &Telecommand) -> Option<u32> {
+    let part = |kind: u32, what: u8, part: u8| kind << 16 | u32::from(what) << 8 | u32::from(part);
+    Some(match telecommand {
+        Telecommand::SetDownlinkSchedule(_) => 1,
+        Telecommand::SetAdcsOmegaKill
+        | Telecommand::SetAdcsAttitude { .. }
+        | Telecommand::SetAdcsTarget { .. }
+        | Telecommand::SetAdcsAuto => 2,
+        Telecommand::SetTimestamp { .. } => 3,
+        Telecommand::SetTle(_) => 4,
+        Telecommand::SetTransmitter { .. } => 5,
+        Telecommand::SetMode { .. } => 6,
+        Telecommand::SetParameter { parameter, .. } => part(7, *parameter, 0),
+        Telecommand::UploadSchedule(upload) => part(8, upload.schedule, upload.part),
+        Telecommand::UploadScript(upload) => part(9, upload.script, upload.part),
+        Telecommand::UploadGuidance(guidance) => part(10, guidance.id, 0),
+        _ => return None,
+    })
 }
 
 /// A sealed frame on its way to the radio.
@@ -136,8 +190,8 @@ pub(super) struct Satellite {
     pub(super) exchange: Exchange,
     pub(super) settling: Vec<Settling>,
     pub(super) image: Option<Assembly>,
-    /// A CaptureImage of ours may have been obeyed: the next ImageInfo declares a new image.
-    pub(super) capture_pending: bool,
+    /// These CaptureImages of ours may have been obeyed: the next ImageInfo declares a new image.
+    pub(super) captures: BTreeSet<CommandId>,
     pub(super) download: Option<Download>,
     pub(super) last_tag: Option<RequestTag>,
     /// Of the newest heartbeat: when it was heard, uptime in ms.

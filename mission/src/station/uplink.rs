@@ -4,23 +4,26 @@
 //! command is marked `radiating`, the mark before the radio gets a byte. A [`Effect::Transmit`] is built in one place,
 //! in [`Station::hand_over`], and only from a frame that has come this way.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
-use protocol::{Answer, Counter, KeyId, Nonce, RequestTag, Telecommand, UP_PLAINTEXT_LEN, down_type, seal};
+use protocol::{Answer, Counter, FRAME_LEN, KeyId, Nonce, RequestTag, Telecommand, UP_PLAINTEXT_LEN, seal};
 
 use super::gate::{Need, Wait};
-use super::outcome::mono_of;
-use super::satellite::{Awaited, Exchange, Prepared, Settling, Step, chunks_asked};
+use super::satellite::{Awaited, Before, Exchange, Prepared, Settling, Step, chunks_asked, setting};
 use super::{About, Station};
 use crate::clock::{MonoUs, Now};
 use crate::id::{CommandId, TxId};
 use crate::level::Level;
-use crate::port::{Effect, LinkState, MaybeRadiated, Transmit};
+use crate::port::{Effect, MaybeRadiated, Transmit};
 use crate::record::{CounterFloorRecord, EventKind, Gate, Record, SealedRecord, Subject};
+use crate::snapshot::SealedSnapshot;
 use crate::stage::Stage;
 
 /// A radio that says nothing for this long has taken the frame to its grave.
 const GIVE_UP_US: u64 = 30_000_000;
+/// So many unanswered CaptureImages are remembered; one is enough to expect a new image.
+const CAPTURES_MAX: usize = 16;
 /// A witness that could not be raised is tried again after this.
 const WITNESS_RETRY_US: u64 = 2_000_000;
 /// A picture may take this long.
@@ -32,7 +35,7 @@ const SETTLE_PERIODS: u64 = 3;
 /// Two Resets are this far apart, in microseconds.
 const RESETS_APART_US: i64 = 60_000_000;
 /// After the radio refused a frame, nothing is tried for this long.
-const REFUSED_US: u64 = 2_000_000;
+pub(super) const REFUSED_US: u64 = 2_000_000;
 
 impl Station {
     /// Does whatever the uplink of this satellite can do now.
@@ -131,6 +134,11 @@ impl Station {
                 until: Some(command.not_before),
             });
         }
+        if let Some((stage, why)) = self.unwanted(now, s, id) {
+            let me = self.me.clone();
+            self.give_up(now, s, id, stage, &me, why);
+            return Err(nothing());
+        }
         if let Some(until) = self.other_reset_until(now, s, id) {
             return Err(Wait { why: "an earlier Reset is not settled yet".into(), until: Some(until) });
         }
@@ -138,6 +146,10 @@ impl Station {
             Need { gate: command.record.gate, answer_us: self.answer_us(s, l, &command.record.telecommand) };
         self.gate(now, s, l, need)?;
         match command.sealed.clone() {
+            Some(sealed) if !self.may_go_on(s, &sealed) => {
+                self.unseal(now, s, id, "its counter is not the newest of its key any more");
+                Err(nothing())
+            }
             Some(sealed) => {
                 // Sealed in the last life: the same bytes go on, their counter is still the newest.
                 let frame = Prepared {
@@ -156,6 +168,26 @@ impl Station {
         }
     }
 
+    /// Bytes that were sealed in the last life may still be radiated: with the key of now, and nothing came after them.
+    fn may_go_on(&self, s: usize, sealed: &SealedSnapshot) -> bool {
+        let sealer = self.satellites[s].sealer.as_ref();
+        sealer.is_some_and(|sealer| sealer.id == sealed.key && sealer.is_newest(sealed.counter))
+    }
+
+    /// Why a command is not wanted on the air any more, though it was.
+    fn unwanted(&self, now: Now, s: usize, id: CommandId) -> Option<(Stage, &'static str)> {
+        let sat = &self.satellites[s];
+        let record = &sat.commands.get(&id)?.record;
+        let is_over = |of| sat.download.as_ref().is_none_or(|active| active.record.id != of);
+        if record.expires_at.is_some_and(|at| at <= now.utc) {
+            Some((Stage::Expired, "its time ran out"))
+        } else if record.download.is_some_and(is_over) {
+            Some((Stage::Cancelled, "its download is over"))
+        } else {
+            None
+        }
+    }
+
     /// Two Resets shortly after each other could not be told apart by telemetry: the second waits until then.
     fn other_reset_until(&self, now: Now, s: usize, id: CommandId) -> Option<MonoUs> {
         let commands = &self.satellites[s].commands;
@@ -164,8 +196,9 @@ impl Station {
         }
         let others =
             commands.values().filter(|c| c.record.id != id && c.record.telecommand == Telecommand::Reset);
-        let until = others.filter_map(|c| c.on_air_at).map(|at| at.plus(RESETS_APART_US)).max()?;
-        (until > now.utc).then(|| mono_of(now, until))
+        let newest_us = others.filter_map(|c| c.since_on_air_us(now)).min()?;
+        let left_us = RESETS_APART_US.saturating_sub(newest_us).min(RESETS_APART_US);
+        u64::try_from(left_us).ok().filter(|left| *left > 0).map(|left| now.mono.plus(left))
     }
 
     fn seal(&mut self, now: Now, s: usize, l: usize, id: CommandId) -> Result<(), Wait> {
@@ -182,16 +215,25 @@ impl Station {
         self.entropy.fill(&mut random);
         self.entropy.fill(&mut padding);
         sealer.spend(permit.counter);
-        let tell_leap = permit.leapt && !std::mem::replace(&mut sealer.leap_told, permit.leapt);
+        let told = std::mem::replace(&mut sealer.leap_told, permit.leapt);
+        let tell_leap = permit.leapt && !told;
         let (nonce, key) = (Nonce::new(permit.counter, random), sealer.id);
         let tag = sat.last_tag.map_or(RequestTag::FIRST, RequestTag::next);
         let command = sat.commands.get_mut(&id).ok_or_else(nothing)?;
         let bytes =
             Arc::new(*seal(&sealer.key, nonce, tag, &command.record.telecommand, &padding).as_bytes());
         sat.last_tag = Some(tag);
-        command.attempt += 1;
+        command.before =
+            Before { tag: command.tag, on_air_at: command.on_air_at, on_air_mono: command.on_air_mono };
+        command.attempt = command.attempt.saturating_add(1);
         command.tag = Some(tag);
         let attempt = command.attempt;
+        // Satellites that share a key share its counter.
+        for other in self.satellites.iter_mut().filter_map(|sat| sat.sealer.as_mut()) {
+            if other.id == key {
+                other.spend(permit.counter);
+            }
+        }
         let sealed_at = now.utc;
         self.journal.push(Record::Sealed(SealedRecord {
             key,
@@ -259,6 +301,10 @@ impl Station {
             self.satellites[s].exchange = Exchange::Idle;
             return;
         };
+        if let Some((_, why)) = self.unwanted(now, s, frame.command) {
+            self.unseal(now, s, frame.command, why);
+            return;
+        }
         if let Err(wait) = self.gate(now, s, frame.link, need) {
             if wait.until.is_none() {
                 let why = format!("not radiated: {}", wait.why);
@@ -284,33 +330,60 @@ impl Station {
         self.satellites[s].exchange = Exchange::Preparing(frame, Step::Marking(ticket));
     }
 
-    /// Back to the queue: nothing was radiated, and these bytes never will be.
+    /// Back to the queue: nothing was radiated, and these bytes never will be. A request of the machine ends here: what
+    /// it asked for may have come meanwhile, so it is worked out anew.
     fn unseal(&mut self, now: Now, s: usize, id: CommandId, why: &str) {
-        self.satellites[s].exchange = Exchange::Idle;
+        let again_at = now.mono.plus(REFUSED_US);
+        let sat = &mut self.satellites[s];
+        sat.exchange = Exchange::Idle;
+        sat.captures.remove(&id);
         self.stage(now, s, id, Stage::Queued, why, None);
-        if let Some(command) = self.satellites[s].commands.get_mut(&id) {
-            command.sealed = None;
-            // What was not radiated was no attempt.
-            command.attempt = command.attempt.saturating_sub(1);
-            command.not_before = now.mono.plus(REFUSED_US);
+        let sat = &mut self.satellites[s];
+        let Some(command) = sat.commands.get_mut(&id) else { return };
+        command.sealed = None;
+        // What was not radiated was no attempt.
+        command.attempt = command.attempt.saturating_sub(1);
+        command.not_before = again_at;
+        let before = command.before;
+        (command.tag, command.on_air_at, command.on_air_mono) =
+            (before.tag, before.on_air_at, before.on_air_mono);
+        if let Some(download) = command.record.download {
+            if let Some(active) = sat.download.as_mut().filter(|active| active.record.id == download) {
+                active.not_before = active.not_before.max(again_at);
+            }
+            let me = self.me.clone();
+            self.give_up(
+                now,
+                s,
+                id,
+                Stage::Cancelled,
+                &me,
+                "not radiated: what is missing is asked for anew",
+            );
         }
     }
 
     /// The only place where bytes are handed to a radio.
     fn hand_over(&mut self, now: Now, s: usize, frame: Prepared) {
-        let sat = &mut self.satellites[s];
-        let link = &mut self.links[frame.link];
-        if link.state != LinkState::Ok || self.stopping {
-            self.unseal(now, s, frame.command, "the link went away before the bytes were handed over");
+        // The commit may have taken a while: everything that held before it must hold now.
+        if let Some(why) = self.no_more(now, s, &frame) {
+            self.unseal(now, s, frame.command, &format!("not handed over: {why}"));
             return;
         }
+        let sat = &mut self.satellites[s];
+        let link = &mut self.links[frame.link];
         self.last_tx += 1;
         let tx = TxId(self.last_tx);
         link.on_air = Some(tx);
         if let Some(command) = sat.commands.get_mut(&frame.command) {
-            command.on_air_at = Some(now.utc);
+            command.goes_on_air(now);
             command.sealed = None;
-            sat.capture_pending |= matches!(command.record.telecommand, Telecommand::CaptureImage { .. });
+            if matches!(command.record.telecommand, Telecommand::CaptureImage { .. }) {
+                sat.captures.insert(frame.command);
+                if sat.captures.len() > CAPTURES_MAX {
+                    sat.captures.pop_first();
+                }
+            }
         }
         self.effects.push_back(Effect::Transmit(Transmit {
             tx,
@@ -320,6 +393,40 @@ impl Station {
             frame: Arc::clone(&frame.bytes),
         }));
         sat.exchange = Exchange::OnAir { frame, tx, give_up_at: now.mono.plus(GIVE_UP_US) };
+    }
+
+    /// Why this frame must not be handed over any more.
+    fn no_more(&self, now: Now, s: usize, frame: &Prepared) -> Option<Cow<'static, str>> {
+        let Some(command) = self.satellites[s].commands.get(&frame.command) else {
+            return Some("the command is over".into());
+        };
+        if let Some((_, why)) = self.unwanted(now, s, frame.command) {
+            return Some(why.into());
+        }
+        let answer_us = self.answer_us(s, frame.link, &command.record.telecommand);
+        self.gate(now, s, frame.link, Need { gate: command.record.gate, answer_us })
+            .err()
+            .map(|wait| wait.why)
+    }
+
+    /// A command that sets something was radiated: what waits to be repeated and sets the same thing is out of date, and
+    /// would undo it.
+    fn supersede(&mut self, now: Now, s: usize, by: CommandId) {
+        let commands = &self.satellites[s].commands;
+        let Some(set) = commands.get(&by).and_then(|c| setting(&c.record.telecommand)) else { return };
+        let is_old = |id: CommandId| {
+            id != by
+                && commands.get(&id).is_some_and(|c| {
+                    c.stage == Stage::Queued
+                        && c.on_air_at.is_some()
+                        && setting(&c.record.telecommand) == Some(set)
+                })
+        };
+        let old: Vec<CommandId> = commands.keys().copied().filter(|id| is_old(*id)).collect();
+        for id in old {
+            let why = format!("command {by} sets the same thing and went out after it: it is not repeated");
+            self.stage(now, s, id, Stage::Unknown, &why, None);
+        }
     }
 
     fn exchange_of(&self, tx: TxId) -> Option<(usize, Prepared)> {
@@ -340,12 +447,13 @@ impl Station {
         let link = &mut self.links[frame.link];
         link.on_air = None;
         link.radiated += 1;
-        link.airtime_us += airtime_us;
+        link.airtime_us = link.airtime_us.saturating_add(airtime_us);
+        self.supersede(now, s, frame.command);
         let sat = &mut self.satellites[s];
         let open = sat.commands.get_mut(&frame.command).filter(|c| c.stage == Stage::Radiating);
         let is_open = open.is_some();
         if let Some(command) = open {
-            command.on_air_at = Some(now.utc);
+            command.goes_on_air(now);
         }
         if is_open {
             let why = format!("{} ms on the air", airtime_us / 1_000);
@@ -361,12 +469,12 @@ impl Station {
             self.satellites[s].commands.get(&frame.command).is_some_and(|c| c.stage == Stage::Radiating);
         match radiated {
             MaybeRadiated::No if still_open => {
-                self.satellites[s].capture_pending = false;
                 self.unseal(now, s, frame.command, &format!("nothing was radiated: {reason}"));
             }
             MaybeRadiated::No => self.satellites[s].exchange = Exchange::Idle,
             MaybeRadiated::Maybe => {
                 // It may be on its way: leave the satellite the time to answer, whatever is done next.
+                self.supersede(now, s, frame.command);
                 self.await_answer(now, s, &frame);
                 if let Exchange::Awaiting(awaited) = &self.satellites[s].exchange {
                     let until = awaited.deadline;
@@ -394,7 +502,7 @@ impl Station {
         };
         let answer = command.record.telecommand.answer();
         let answer_us = self.answer_us(s, frame.link, &command.record.telecommand);
-        let settle_us = sat.profile.heartbeat_period_us * SETTLE_PERIODS;
+        let settle_us = sat.profile.heartbeat_period_us.saturating_mul(SETTLE_PERIODS);
         let settling = |busy_until, deadline| Settling {
             command: frame.command,
             tag: frame.tag,
@@ -443,15 +551,15 @@ impl Station {
         };
         match telecommand.answer() {
             Answer::None => timing.turn_round_us,
-            Answer::One(down_type::PONG) => one(16),
-            Answer::One(_) => one(157) + extra,
+            // A satellite may send any packet as a full frame.
+            Answer::One(_) => one(FRAME_LEN) + extra,
             Answer::Chunks => {
                 let in_image = sat.image.as_ref().map(|image| image.record.chunks);
                 let count: u64 =
                     chunks_asked(telecommand, in_image).iter().map(|&(_, count)| u64::from(count)).sum();
                 let stretch = count.max(1) * link.chunk_period_us();
-                let heartbeats = sat.contact.heartbeats_within(stretch) * timing.frame_us(133);
-                timing.turn_round_us + stretch + heartbeats + timing.delivery_us(240)
+                let heartbeats = sat.contact.heartbeats_within(stretch) * timing.frame_us(FRAME_LEN);
+                timing.turn_round_us + stretch + heartbeats + timing.delivery_us(FRAME_LEN)
             }
         }
     }
