@@ -1,27 +1,34 @@
-//! One fuzz body per decoder of the wire. A body takes any bytes and asserts what must hold for all bytes: no panic,
-//! bounds, round trips, and for the stream decoders the same result as a naive reading of the ICD.
+//! One fuzz body per decoder of the wire and of what a radio module answers. A body takes any bytes and asserts what
+//! must hold for all bytes: no panic, bounds, round trips, and for the stream decoders the same result as a naive reading
+//! of the ICD.
 //!
 //! The bodies know no fuzzing engine: `cargo test -p fuzz` runs them on stable over `corpus/<body>/` and over seeded
 //! mutations of it; `libfuzzer/` runs the same bodies under coverage guidance by hand (`README.md`). A finding becomes a
 //! file in the corpus.
 
 mod down;
+mod radio_driver;
+mod radio_reply;
 mod up;
 
 pub use down::{down_frame, down_stream, downlink_payload};
+pub use radio_driver::radio_driver;
+pub use radio_reply::radio_reply;
 pub use up::{sealed_open, telecommand_payload, up_stream};
 
 /// A body: takes any bytes, panics when an invariant is broken.
 pub type Body = fn(&[u8]);
 
 /// Every body by the name of its corpus folder and fuzz target.
-pub const BODIES: [(&str, Body); 6] = [
+pub const BODIES: [(&str, Body); 8] = [
     ("down_stream", down_stream),
     ("down_frame", down_frame),
     ("downlink_payload", downlink_payload),
     ("telecommand_payload", telecommand_payload),
     ("up_stream", up_stream),
     ("sealed_open", sealed_open),
+    ("radio_reply", radio_reply),
+    ("radio_driver", radio_driver),
 ];
 
 /// Feeds a stream in pieces whose lengths a few input bytes choose.
