@@ -19,7 +19,7 @@ pub fn workspace() -> &'static Path {
 }
 
 /// `gs-server`. Built by cargo when it is missing or older than its source: `cargo nextest run -p end-to-end` alone
-/// builds no binary of another package.
+/// builds no binary of another package. `GS_SERVER` in the environment names another binary, such as an installed one.
 ///
 /// # Panics
 /// When it cannot be built.
@@ -27,6 +27,9 @@ pub fn workspace() -> &'static Path {
 pub fn gs_server() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| {
+        if let Some(named) = std::env::var_os("GS_SERVER").filter(|path| !path.is_empty()) {
+            return named.into();
+        }
         let path = profile_folder().join("gs-server");
         if is_old(&path) {
             build(&path);

@@ -9,6 +9,7 @@
 //! | [`pty`] | a pseudo-terminal, for tests that play the radio themselves |
 //! | [`stream`] | a follower of the WebSocket |
 //! | [`journal`] | what the twin wrote down: the far end's own witness |
+//! | [`watch`], [`operator`] | somebody who remembers what the server published; somebody who commands |
 //! | [`wait`] | waiting for the real world |
 //!
 //! Everything here is as far outside the server as an operator is: it knows the wire types (`api`), the radio link
@@ -23,10 +24,12 @@ pub mod binary;
 pub mod folder;
 pub mod http;
 pub mod journal;
+pub mod operator;
 pub mod process;
 pub mod pty;
 pub mod stream;
 pub mod wait;
+pub mod watch;
 
 pub use folder::Folder;
 pub use http::Client;
