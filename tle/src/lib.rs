@@ -1,0 +1,33 @@
+//! Where satellites are: mean elements in every form, SGP4, frames, look angles, Doppler, Sun and shadow.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`elements`] | SGP4 mean elements of one object, with every field of its OMM or TLE |
+//! | [`propagator`] | SGP4 and SDP4: elements and a time to position and velocity in TEME |
+//! | [`time`] | UTC instants in microseconds, and UT1-UTC |
+//! | [`frames`] | sidereal time, TEME to Earth-fixed |
+//! | [`geodetic`] | the WGS84 ellipsoid |
+//! | [`station`], [`mask`], [`look`] | a place, its horizon, and look angles with their rates |
+//! | [`vector`] | three numbers that belong together |
+//!
+//! Everything is a pure function of its arguments: no clock, no file, no network, no randomness. Angles are radians
+//! and units SI or km inside; names tell unit and frame (`r_teme_km`, `elevation_deg`).
+
+pub mod elements;
+pub mod frames;
+pub mod geodetic;
+pub mod look;
+pub mod mask;
+pub mod propagator;
+pub mod station;
+pub mod time;
+pub mod vector;
+
+pub use elements::{Elements, best_for};
+pub use frames::{EarthFixed, ecef_from_teme, gmst_rad};
+pub use geodetic::Geodetic;
+pub use look::LookAngles;
+pub use mask::HorizonMask;
+pub use propagator::{Fault, PropagationError, Propagator, State};
+pub use station::Station;
+pub use time::{EarthOrientation, UtcInstant};
