@@ -4,22 +4,33 @@
 //! |---|---|
 //! | [`elements`] | SGP4 mean elements of one object, with every field of its OMM or TLE |
 //! | [`propagator`] | SGP4 and SDP4: elements and a time to position and velocity in TEME |
+//! | [`batch`] | near-earth SGP4 for many instants or objects at once |
 //! | [`time`] | UTC instants in microseconds, and UT1-UTC |
 //! | [`frames`] | sidereal time, TEME to Earth-fixed |
 //! | [`geodetic`] | the WGS84 ellipsoid |
 //! | [`station`], [`mask`], [`look`] | a place, its horizon, and look angles with their rates |
+//! | [`doppler`] | what the station hears, and what it must send |
+//! | [`sun`], [`shadow`] | where the Sun stands; umbra and penumbra and the times of their edges |
+//! | [`ground`] | sub-satellite point, ground track, footprint |
+//! | [`gravity`] | the acceleration of an orbit, as far as interpolation needs it |
 //! | [`vector`] | three numbers that belong together |
 //!
 //! Everything is a pure function of its arguments: no clock, no file, no network, no randomness. Angles are radians
 //! and units SI or km inside; names tell unit and frame (`r_teme_km`, `elevation_deg`).
 
+pub mod doppler;
+pub mod batch;
 pub mod elements;
 pub mod frames;
 pub mod geodetic;
+pub mod gravity;
+pub mod ground;
 pub mod look;
 pub mod mask;
 pub mod propagator;
+pub mod shadow;
 pub mod station;
+pub mod sun;
 pub mod time;
 pub mod vector;
 
