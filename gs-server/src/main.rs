@@ -1,5 +1,6 @@
 //! The program `gs-server`: arguments in, exit code out. Everything else is in the library.
 
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -44,7 +45,8 @@ fn start_logging(settings: &LogSettings) -> anyhow::Result<SetLogFilter> {
     let lines: Box<dyn Layer<_> + Send + Sync> = if settings.json {
         Box::new(fmt::layer().json().with_writer(std::io::stderr))
     } else {
-        Box::new(fmt::layer().with_target(false).with_writer(std::io::stderr))
+        let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        Box::new(fmt::layer().with_target(false).with_ansi(colours).with_writer(std::io::stderr))
     };
     tracing_subscriber::registry().with(filter).with(lines).init();
     Ok(Arc::new(move |filter: &str| {

@@ -23,7 +23,7 @@ Raw frames are never touched. No server may run on the folder meanwhile. Broken 
 where it was. Exit code 1 if rows were found damaged, 3 if the folder is in use.")]
 pub struct Redecode {
     /// The data folder of a station
-    #[arg(long, value_name = "DIR", env = "GS_DATA")]
+    #[arg(long, value_name = "DIR", env = "GS_DATA", hide_env_values = true)]
     data: PathBuf,
     /// One JSON object at the end
     #[arg(long)]

@@ -65,7 +65,7 @@ pub struct Serve {
     #[command(flatten)]
     satellite: Satellite,
     /// One JSON object when ready, one at the end
-    #[arg(long)]
+    #[arg(long, help_heading = "Options")]
     json: bool,
 }
 

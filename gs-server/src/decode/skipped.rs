@@ -127,6 +127,9 @@ impl SkippedRuns {
 
     /// Whether a frame begins at the first byte of the window and came to nothing.
     fn candidate(&self, left: u64) -> Option<SkipReason> {
+        if !self.window.front().is_some_and(|first| [DOWN_MAGIC[0], UP_MAGIC[0]].contains(first)) {
+            return None;
+        }
         let head = |len: usize| self.window.iter().take(len).copied();
         if head(MAGIC_LEN).eq(UP_MAGIC) {
             return Some(SkipReason::CutOff);

@@ -153,17 +153,17 @@ pub async fn run(
     ready: impl FnOnce(&Stage),
     mut progress: impl FnMut(&Progress),
 ) -> Result<Summary, DemoError> {
-    let scene = scene::Scene::set(&options, &stop).await?;
+    let scene = scene::Scene::set(&options).await?;
     ready(&scene.stage);
     let outcome = direct(&options, &scene, &stop, &mut progress).await;
     let summary = match outcome {
-        Ok(ending) => summary::Summary::gather(&options, &scene, ending).await,
+        // What it died of is known when it is struck.
+        Ok(Ending::PartEnded) => Err(DemoError::RunDied),
+        Ok(ending) => summary::Summary::gather(&options, &scene, &ending).await,
         Err(error) => Err(error),
     };
-    let ended = scene.strike().await;
-    let summary = summary?;
-    ended?;
-    Ok(summary)
+    scene.strike().await?;
+    summary
 }
 
 /// How the showing ended.

@@ -1,8 +1,6 @@
 //! What an operator would send during a demo, through the door that operators have.
 
-use mission::{
-    Accepted, CommandIntent, DownloadId, Gate, ImageId, Intent, Now, Principal, SatelliteId, Status,
-};
+use mission::{CommandIntent, Gate, ImageId, Intent, Now, Principal, SatelliteId, Status};
 use protocol::{Resolution, Telecommand};
 use sha2::{Digest as _, Sha256};
 
@@ -19,9 +17,9 @@ pub(super) struct Operator {
     asked: u64,
     greeted: bool,
     until_image: bool,
-    download: Option<DownloadId>,
     /// The image that came home last, and when on the clock's scale.
     home: Option<(ImageId, u64)>,
+    /// A new picture was asked for and is not ordered yet.
     captured: bool,
 }
 
@@ -33,7 +31,6 @@ impl Operator {
             asked: 0,
             greeted: false,
             until_image,
-            download: None,
             home: None,
             captured: false,
         }
@@ -54,24 +51,24 @@ impl Operator {
         if self.until_image || satellite.download.is_some() {
             return;
         }
+        if self.captured {
+            if satellite.queued == 0 && satellite.outstanding.is_none() {
+                self.captured = false;
+                self.order_image().await;
+            }
+            return;
+        }
         let Some(image) = satellite.image.as_ref().filter(|image| image.chunks > 0 && image.held == image.chunks)
         else {
             return;
         };
         match self.home {
             Some((home, since_us)) if home == image.image => {
-                if now.mono.0 < since_us + NEXT_PICTURE_US || satellite.in_view == Some(false) {
-                    return;
-                }
-                if !self.captured {
+                if now.mono.0 >= since_us + NEXT_PICTURE_US && satellite.in_view != Some(false) {
                     self.captured = true;
                     let resolution = Resolution::Cif;
                     let capture = Telecommand::CaptureImage { resolution, grey: false, strong_compression: false };
                     self.command(capture).await;
-                } else if satellite.queued == 0 && satellite.outstanding.is_none() {
-                    self.captured = false;
-                    self.home = Some((image.image, now.mono.0));
-                    self.order_image().await;
                 }
             }
             _ => self.home = Some((image.image, now.mono.0)),
@@ -79,10 +76,8 @@ impl Operator {
     }
 
     async fn order_image(&mut self) {
-        if let Ok(satellite) = SatelliteId::new("pixelsat-1")
-            && let Some(Accepted::Download(id)) = self.ask(Intent::Download { satellite, link: None }).await
-        {
-            self.download = Some(id);
+        if let Ok(satellite) = SatelliteId::new("pixelsat-1") {
+            self.ask(Intent::Download { satellite, link: None }).await;
         }
     }
 
@@ -102,16 +97,12 @@ impl Operator {
         self.ask(Intent::Command(intent)).await;
     }
 
-    async fn ask(&mut self, intent: Intent) -> Option<Accepted> {
+    async fn ask(&mut self, intent: Intent) {
         self.asked += 1;
         let key = format!("demo-{}-{}", self.life, self.asked);
         let digest = Sha256::digest(&key).into();
-        match self.engine.intent(Principal::new("demo"), key, digest, intent).await {
-            Ok(done) => Some(done.accepted),
-            Err(error) => {
-                tracing::warn!("the demo's operator was refused: {error}");
-                None
-            }
+        if let Err(error) = self.engine.intent(Principal::new("demo"), key, digest, intent).await {
+            tracing::warn!("the demo's operator was refused: {error}");
         }
     }
 }

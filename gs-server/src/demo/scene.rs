@@ -78,7 +78,7 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    pub(super) async fn set(options: &DemoOptions, stop: &CancellationToken) -> Result<Self, DemoError> {
+    pub(super) async fn set(options: &DemoOptions) -> Result<Self, DemoError> {
         let wall = crate::clock::SystemClock::new();
         make_folder(&options.data)?;
         let data = std::fs::canonicalize(&options.data)
@@ -135,7 +135,7 @@ impl Scene {
             })),
             ..RunOptions::new(config)
         };
-        let server_stop = stop.child_token();
+        let server_stop = CancellationToken::new();
         let server = spawn_server(run_options, listener, server_stop.clone(), ended.clone());
         let Ok(ready) = is_ready.await else {
             twin_stop.cancel();

@@ -96,7 +96,7 @@ pub struct Hashes {
 }
 
 impl Summary {
-    pub(super) async fn gather(options: &DemoOptions, scene: &Scene, ending: Ending) -> Result<Self, DemoError> {
+    pub(super) async fn gather(options: &DemoOptions, scene: &Scene, ending: &Ending) -> Result<Self, DemoError> {
         let store = &scene.ready.store;
         let twin = scene.twin_view().await?;
         let status = scene.ready.engine.status();
@@ -109,7 +109,7 @@ impl Summary {
             None => None,
         };
         let equal = ground.as_ref().is_some_and(|ground| *ground == twin.image && !ground.is_empty());
-        let reason = (!equal).then(|| reason(&ending, image.as_ref().map(|image| (image.held, image.chunks))));
+        let reason = (!equal).then(|| reason(ending, image.as_ref().map(|image| (image.held, image.chunks))));
         let timing = LinkTiming::default();
         let total = image.as_ref().map_or(0, |image| image.chunks);
         let bound_frames = total as f64 / (1.0 - options.channel.loss).max(f64::MIN_POSITIVE);

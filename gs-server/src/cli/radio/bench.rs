@@ -17,6 +17,9 @@ use crate::config::LinkSection;
 use crate::links::port::{AuxWatch, Connector as _, EVENTS, Events, Port, PortContext, PortEvent};
 use crate::links::serial::Serial;
 
+/// What the module needs to confirm a software switch, with room to spare; frames are longer on the air.
+const SWITCH_BACK_US: u64 = 150_000;
+
 /// What happened.
 #[derive(Debug)]
 pub(super) enum Notice {
@@ -24,8 +27,8 @@ pub(super) enum Notice {
     State(DriverState),
     /// Something to read.
     Finding(Diagnostic),
-    /// The driver would change the module now, and was not let: the module is in normal mode again.
-    WouldChange,
+    /// The driver would write this to change the module, and was not let: the module is in normal mode again.
+    WouldChange(Vec<u8>),
     /// Bytes in data mode.
     Heard(Vec<u8>),
     /// The port is gone.
@@ -42,6 +45,8 @@ pub(super) struct Bench {
     dry: bool,
     /// The driver was stopped before a change; bytes go past it.
     stopped: bool,
+    /// Until then the module only confirms that it is back in normal mode.
+    deaf_until: MonoUs,
     notices: VecDeque<Notice>,
     log: Option<RawLog>,
 }
@@ -66,6 +71,7 @@ impl Bench {
             events,
             dry,
             stopped: false,
+            deaf_until: MonoUs(0),
             notices: VecDeque::new(),
             log,
         };
@@ -101,7 +107,9 @@ impl Bench {
             PortEvent::Bytes { bytes, received } => {
                 self.log('<', &bytes, received);
                 if self.stopped {
-                    self.notices.push_back(Notice::Heard(bytes));
+                    if received.mono > self.deaf_until {
+                        self.notices.push_back(Notice::Heard(bytes));
+                    }
                 } else {
                     self.drive(DriverInput::Bytes(&bytes));
                 }
@@ -125,6 +133,7 @@ impl Bench {
         self.driver.handle(now.mono.0, input);
         while let Some(output) = self.driver.next_output() {
             if let Err(reason) = self.carry_out(output, now) {
+                let reason = self.reason_of_loss().unwrap_or(reason);
                 self.notices.push_back(Notice::Lost(reason));
                 return;
             }
@@ -138,7 +147,8 @@ impl Bench {
         match output {
             DriverOutput::Write(bytes) if self.dry && changes_the_module(&bytes) => {
                 self.stopped = true;
-                self.notices.push_back(Notice::WouldChange);
+                self.deaf_until = now.mono.plus(SWITCH_BACK_US);
+                self.notices.push_back(Notice::WouldChange(bytes));
                 self.back_to_normal()
             }
             DriverOutput::Write(bytes) => {
@@ -168,6 +178,16 @@ impl Bench {
             | DriverOutput::TxFailed { .. }
             | DriverOutput::Reopen { .. } => Ok(()),
         }
+    }
+
+    /// A port that takes nothing any more has said why.
+    fn reason_of_loss(&mut self) -> Option<String> {
+        while let Ok((event, _)) = self.events.try_recv() {
+            if let PortEvent::Lost { reason } = event {
+                return Some(reason);
+            }
+        }
+        None
     }
 
     fn back_to_normal(&mut self) -> Result<(), String> {

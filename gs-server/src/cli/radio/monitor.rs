@@ -64,7 +64,7 @@ impl Monitor {
                         decoder.silence(&mut |report| reports.push(report));
                     }
                 }
-                Some(Notice::State(DriverState::Ready) | Notice::WouldChange) => {
+                Some(Notice::State(DriverState::Ready) | Notice::WouldChange(_)) => {
                     let rssi = bench.driver.facts().rssi_byte.unwrap_or(self.rssi);
                     eprintln!("listening on {}, RSSI byte {}", self.wiring.port, if rssi { "on" } else { "off" });
                     decoder.get_or_insert_with(|| Decoder::new(rssi).with_hex(true));

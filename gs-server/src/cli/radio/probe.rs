@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use clap::Args;
-use radio::driver::DriverState;
+use radio::driver::{DriverState, Generation};
 
 use super::super::shell::{print_json, print_line, runtime};
 use super::bench::{Bench, Notice};
 use super::module::Module;
 use super::{Exit, Failure, Settings, Wiring};
 use crate::clock::within;
+use crate::config::ModePinWiring;
 
 /// A bring-up with all its repetitions takes less.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -31,13 +32,13 @@ pub struct Configure {
     #[command(flatten)]
     settings: Settings,
     /// Write what differs; into RAM, until the power goes
-    #[arg(long)]
+    #[arg(long, help_heading = "Options")]
     write: bool,
     /// With --write: into flash
-    #[arg(long, requires = "write")]
+    #[arg(long, help_heading = "Options", requires = "write")]
     save: bool,
     /// Let modes be changed by a command on the data line, so that mode_pins = "software" works later
-    #[arg(long)]
+    #[arg(long, help_heading = "Options")]
     software_switch: bool,
 }
 
@@ -94,6 +95,9 @@ async fn bring_up(
     change: Change,
 ) -> Result<(Module, DriverState), Failure> {
     let section = wiring.section()?;
+    if section.mode_pins() == ModePinWiring::Strapped {
+        return Err(Failure::usage("a strapped module cannot be asked anything; wire M0 and M1, or see `radio monitor`"));
+    }
     let mut config = settings.driver_config(&section)?;
     config.save_to_flash = change.save;
     config.software_switch = change.software_switch;
@@ -106,7 +110,8 @@ async fn bring_up(
     let result = within(PATIENCE, async {
         loop {
             match bench.next().await {
-                Notice::State(DriverState::Ready | DriverState::Fault) | Notice::WouldChange => return Ok(()),
+                Notice::State(DriverState::Ready | DriverState::Fault) => return Ok(None),
+                Notice::WouldChange(bytes) => return Ok(Some(bytes)),
                 Notice::State(state) => tracing::info!("{state:?}"),
                 Notice::Finding(finding) => tell_step(finding.to_string()),
                 Notice::Heard(bytes) => tracing::info!("{} bytes heard meanwhile", bytes.len()),
@@ -115,11 +120,19 @@ async fn bring_up(
         }
     })
     .await;
-    match result {
+    let would_write = match result {
         Some(result) => result?,
-        None => tell_step(format!("nothing came to an end within {} s", PATIENCE.as_secs())),
+        None => {
+            tell_step(format!("nothing came to an end within {} s", PATIENCE.as_secs()));
+            None
+        }
+    };
+    let mut facts = bench.driver.facts().clone();
+    // The carrier comes before everything else that may be written: had it been wrong, it would be what is written.
+    if would_write.is_some_and(|bytes| !bytes.starts_with(b"AT+")) && facts.generation != Generation::V1 {
+        facts.frequency_hz = Some(config.frequency_hz);
     }
-    Ok((Module::new(&wiring.port, bench.driver.facts(), &config, findings), bench.driver.state()))
+    Ok((Module::new(&wiring.port, &facts, &config, findings), bench.driver.state()))
 }
 
 fn tell(module: &Module, json: bool) -> Result<(), Failure> {

@@ -1,0 +1,64 @@
+//! The help of every verb, as it is printed on a terminal of 100 columns.
+
+use clap::CommandFactory as _;
+use gs_server::cli::Cli;
+
+use super::run;
+
+fn pages(command: &mut clap::Command, path: &str, out: &mut Vec<(String, String)>) {
+    let path = format!("{path} {}", command.get_name()).trim().to_owned();
+    out.push((path.replace(' ', "-"), command.render_long_help().to_string()));
+    for verb in command.get_subcommands_mut().filter(|verb| verb.get_name() != "help") {
+        pages(verb, &path, out);
+    }
+}
+
+#[test]
+fn every_verb_tells_what_it_does() {
+    let mut command = Cli::command().term_width(100);
+    command.build();
+    let mut all = Vec::new();
+    pages(&mut command, "", &mut all);
+    let names: Vec<&str> = all.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "gs-server",
+            "gs-server-serve",
+            "gs-server-config",
+            "gs-server-config-check",
+            "gs-server-config-example",
+            "gs-server-demo",
+            "gs-server-twin",
+            "gs-server-twin-serve",
+            "gs-server-decode",
+            "gs-server-radio",
+            "gs-server-radio-list",
+            "gs-server-radio-probe",
+            "gs-server-radio-configure",
+            "gs-server-radio-monitor",
+            "gs-server-key",
+            "gs-server-key-new",
+            "gs-server-key-list",
+            "gs-server-redecode",
+        ]
+    );
+    for (name, help) in all {
+        assert!(help.lines().all(|line| line.chars().count() <= 104), "{name} is too wide:\n{help}");
+        insta::with_settings!({ omit_expression => true }, { insta::assert_snapshot!(name, help) });
+    }
+}
+
+#[test]
+fn wrong_usage_is_2_and_no_verb_shows_the_help() {
+    for arguments in [&["dance"][..], &["decode", "--format", "morse"], &["serve"], &["twin", "serve", "--journal", "x"]] {
+        let (code, out, error) = run(arguments);
+        assert_eq!((code, out.as_str()), (2, ""), "{error}");
+        assert!(error.contains("--help"), "{error}");
+    }
+    let (code, _, error) = run::<&str>([]);
+    assert_eq!(code, 2);
+    assert!(error.contains("demo"), "{error}");
+    let (code, out, _) = run(["--version"]);
+    assert_eq!((code, out.starts_with("gs-server ")), (0, true));
+}
