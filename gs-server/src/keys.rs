@@ -154,15 +154,17 @@ pub fn load(path: &Path) -> Result<KeyFile, KeyError> {
     // Non-blocking, so that a pipe in the place of a key file cannot hold the start up.
     let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::NOCTTY;
     let mut file =
-        OpenOptions::new().read(true).custom_flags(flags.bits().cast_signed()).open(path).map_err(|error| {
-            if error.kind() == io::ErrorKind::NotFound {
-                KeyError::Missing(path.into())
-            } else if error.raw_os_error() == Some(rustix::io::Errno::LOOP.raw_os_error()) {
-                KeyError::SymbolicLink(path.into())
-            } else {
-                read(error)
-            }
-        })?;
+        OpenOptions::new().read(true).custom_flags(flags.bits().cast_signed()).open(path).map_err(
+            |error| {
+                if error.kind() == io::ErrorKind::NotFound {
+                    KeyError::Missing(path.into())
+                } else if error.raw_os_error() == Some(rustix::io::Errno::LOOP.raw_os_error()) {
+                    KeyError::SymbolicLink(path.into())
+                } else {
+                    read(error)
+                }
+            },
+        )?;
     check_file(path, &file)?;
 
     let mut text = Zeroizing::new(vec![0; FILE_MAX + 1]);
@@ -234,8 +236,11 @@ fn key_line(path: &Path, line: usize, digits: &[u8]) -> Result<Key, KeyError> {
         return Err(KeyError::NotHex { path: path.into(), line, column: at + 1 });
     }
     let mut bytes = Zeroizing::new([0; KEY_LEN]);
-    hex::decode_to_slice(digits, bytes.as_mut_slice())
-        .map_err(|_| KeyError::Length { path: path.into(), line, found: digits.len() })?;
+    hex::decode_to_slice(digits, bytes.as_mut_slice()).map_err(|_| KeyError::Length {
+        path: path.into(),
+        line,
+        found: digits.len(),
+    })?;
     Ok(Key::from_bytes(*bytes))
 }
 
@@ -341,7 +346,10 @@ mod tests {
         for mode in [0o644, 0o640, 0o604, 0o700, 0o620, 0o4600] {
             let path = write(&folder, DIGITS, mode);
             let error = load(&path).unwrap_err();
-            assert!(matches!(error, KeyError::Mode { mode: found, .. } if found == mode), "{mode:o}: {error}");
+            assert!(
+                matches!(error, KeyError::Mode { mode: found, .. } if found == mode),
+                "{mode:o}: {error}"
+            );
             assert!(error.to_string().contains(&format!("chmod 600 {}", path.display())));
         }
     }

@@ -39,8 +39,9 @@ fn sentence(error: &anyhow::Error) -> String {
 
 /// Sets the one global logger, to standard error, and gives the way to change its filter later.
 fn start_logging(settings: &LogSettings) -> anyhow::Result<SetLogFilter> {
-    let filter = EnvFilter::try_new(&settings.filter)
-        .with_context(|| format!("'{}' is no log filter; try `info` or `info,gs_server::links=debug`", settings.filter))?;
+    let filter = EnvFilter::try_new(&settings.filter).with_context(|| {
+        format!("'{}' is no log filter; try `info` or `info,gs_server::links=debug`", settings.filter)
+    })?;
     let (filter, handle) = reload::Layer::<EnvFilter, Registry>::new(filter);
     let lines: Box<dyn Layer<_> + Send + Sync> = if settings.json {
         Box::new(fmt::layer().json().with_writer(std::io::stderr))

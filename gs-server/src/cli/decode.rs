@@ -48,13 +48,16 @@ impl Decode {
         let input: Box<dyn Read> = if name == "-" {
             Box::new(io::stdin().lock())
         } else {
-            Box::new(File::open(&self.file).map_err(|e| Failure::doing(format!("{name} cannot be opened"), e))?)
+            Box::new(
+                File::open(&self.file).map_err(|e| Failure::doing(format!("{name} cannot be opened"), e))?,
+            )
         };
         self.decode(input, io::stdout().lock(), &name)
     }
 
     fn decode(&self, mut input: Box<dyn Read>, output: impl io::Write, name: &str) -> Result<Exit, Failure> {
-        let mut printer = Printer { out: BufWriter::new(output), frames_only: self.frames_only, written: Ok(()) };
+        let mut printer =
+            Printer { out: BufWriter::new(output), frames_only: self.frames_only, written: Ok(()) };
         let mut unwrap = Unwrap::new(self.format);
         let mut decoder = Decoder::new(self.rssi).with_hex(self.hex);
         let mut piece = vec![0; 1 << 16];

@@ -83,13 +83,8 @@ impl Demo {
         let stop = stop_on_signals()?;
         let until_image = options.until_image;
         let bar = Bar::new();
-        let outcome = demo::run(
-            options,
-            stop,
-            |stage| self.tell_stage(stage),
-            |progress| bar.show(progress),
-        )
-        .await;
+        let outcome =
+            demo::run(options, stop, |stage| self.tell_stage(stage), |progress| bar.show(progress)).await;
         bar.bar.finish_and_clear();
         let summary = outcome.map_err(failure)?;
         if self.json {

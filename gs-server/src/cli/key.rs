@@ -85,8 +85,9 @@ impl New {
         fill_random(bytes.as_mut_slice())?;
         let path = if self.id || self.path.is_dir() {
             if self.id && !self.path.exists() {
-                std::fs::create_dir_all(&self.path)
-                    .map_err(|e| Failure::doing(format!("folder {} cannot be made", self.path.display()), e))?;
+                std::fs::create_dir_all(&self.path).map_err(|e| {
+                    Failure::doing(format!("folder {} cannot be made", self.path.display()), e)
+                })?;
             }
             self.path.join(format!("{}.key", keys::key_id(&bytes)))
         } else {
@@ -94,7 +95,12 @@ impl New {
         };
         let id = keys::create(&path, &mut bytes, self.simulated).map_err(Failure::refused)?;
         if self.json {
-            let row = Row { key: Some(id.to_string()), simulated: Some(self.simulated), file: &path, refused: None };
+            let row = Row {
+                key: Some(id.to_string()),
+                simulated: Some(self.simulated),
+                file: &path,
+                refused: None,
+            };
             print_json(&row)?;
         } else {
             print_line(format_args!("{id}  {}", path.display()))?;

@@ -33,7 +33,14 @@ use clap::{Parser, Subcommand};
 )]
 pub struct Cli {
     /// What to log to standard error: a level, or `info,gs_server::links=debug`; also GS_LOG
-    #[arg(long, global = true, value_name = "FILTER", env = "GS_LOG", hide_env_values = true, help_heading = "Logging")]
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILTER",
+        env = "GS_LOG",
+        hide_env_values = true,
+        help_heading = "Logging"
+    )]
     pub log: Option<String>,
     /// Log one JSON object a line
     #[arg(long, global = true, help_heading = "Logging")]

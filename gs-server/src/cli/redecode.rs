@@ -95,7 +95,10 @@ impl Redecode {
 
     async fn open(&self) -> Result<Store, Failure> {
         if !self.data.join("ground.sqlite3").is_file() {
-            return Err(Failure::usage(format!("{} is no data folder: there is no ground.sqlite3", self.data.display())));
+            return Err(Failure::usage(format!(
+                "{} is no data folder: there is no ground.sqlite3",
+                self.data.display()
+            )));
         }
         let options = |simulated| StoreOptions {
             folder: self.data.clone(),
@@ -108,6 +111,8 @@ impl Redecode {
             Err(StoreError::SimulatedMark { simulated, .. }) => Store::open(options(simulated)).await,
             opened => opened,
         };
-        opened.map_err(|error| if is_refusal(&error) { Failure::refused(error) } else { Failure::failed(error) })
+        opened.map_err(
+            |error| if is_refusal(&error) { Failure::refused(error) } else { Failure::failed(error) },
+        )
     }
 }

@@ -64,7 +64,10 @@ impl Serve {
             Ok(config) => drop(reload.try_send(config)),
             Err(error) => {
                 let reason = std::error::Error::source(&error).map(|source| format!(": {source}"));
-                tracing::error!("reload: the old configuration stays in force: {error}{}", reason.unwrap_or_default());
+                tracing::error!(
+                    "reload: the old configuration stays in force: {error}{}",
+                    reason.unwrap_or_default()
+                );
             }
         })?;
         let address = config.http.listen;

@@ -194,8 +194,9 @@ impl Satellite {
             Some("camera") => ImageSource::Camera,
             Some("none") => ImageSource::None,
             _ => {
-                let bytes = std::fs::read(&self.image)
-                    .map_err(|e| Failure::doing(format!("image {} cannot be read", self.image.display()), e))?;
+                let bytes = std::fs::read(&self.image).map_err(|e| {
+                    Failure::doing(format!("image {} cannot be read", self.image.display()), e)
+                })?;
                 ImageSource::Bytes { bytes: bytes.into(), width_px: 408, height_px: 304 }
             }
         };

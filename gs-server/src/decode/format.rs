@@ -209,8 +209,7 @@ fn sniff(head: &[u8], is_all: bool) -> Option<Format> {
         previous = byte;
         in_remark || digit || byte.is_ascii_whitespace() || matches!(byte, b',' | b';' | b':' | b'-')
     });
-    let is_base64 =
-        head.iter().all(|&b| base64_value(b).is_some() || b == b'=' || b.is_ascii_whitespace());
+    let is_base64 = head.iter().all(|&b| base64_value(b).is_some() || b == b'=' || b.is_ascii_whitespace());
     Some(match (is_hex, is_base64) {
         (true, _) => Format::Hex,
         (false, true) => Format::Base64,

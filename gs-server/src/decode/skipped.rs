@@ -43,7 +43,9 @@ impl SkipReason {
             Self::NoMagic => "no frame begins here",
             Self::RadioHeader => "three bytes before a frame: the radio module's header (address, channel)",
             Self::RssiByte => "one byte after a frame: an RSSI byte? then say --rssi",
-            Self::BadChecksum => "a frame begins here, and its checksum is wrong in the short and in the full form",
+            Self::BadChecksum => {
+                "a frame begins here, and its checksum is wrong in the short and in the full form"
+            }
             Self::CutOff => "a frame begins here, and the input ends before it does",
         }
     }
@@ -155,7 +157,9 @@ impl SkippedRuns {
         let length = run.end - run.start;
         let reason = match run.reason {
             SkipReason::NoMagic if length == 3 && before_frame => SkipReason::RadioHeader,
-            SkipReason::NoMagic if length == 1 && self.last_cover_end == Some(run.start) => SkipReason::RssiByte,
+            SkipReason::NoMagic if length == 1 && self.last_cover_end == Some(run.start) => {
+                SkipReason::RssiByte
+            }
             reason => reason,
         };
         tell(Skipped { offset: run.start, length, reason, detail: reason.detail() });

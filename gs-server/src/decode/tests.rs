@@ -11,13 +11,8 @@ fn down(packet: &Downlink, tag: u8, form: FrameForm) -> Vec<u8> {
 
 fn up() -> Vec<u8> {
     let nonce = Nonce::new(Counter(1_700_000_000_000_000), [1, 2, 3, 4]);
-    let sealed = protocol::seal(
-        &Key::from_bytes([9; 16]),
-        nonce,
-        RequestTag::FIRST,
-        &Telecommand::Ping,
-        &[0x5a; 200],
-    );
+    let sealed =
+        protocol::seal(&Key::from_bytes([9; 16]), nonce, RequestTag::FIRST, &Telecommand::Ping, &[0x5a; 200]);
     sealed.as_bytes().to_vec()
 }
 
@@ -53,7 +48,9 @@ fn frames_come_with_fields_and_what_lies_between_with_its_reason() {
     let (lines, summary) = decode(&stream, false);
     let kinds: Vec<_> = lines
         .iter()
-        .map(|line| (line["offset"].as_u64().unwrap(), line["reason"].as_str().or(line["kind"].as_str()).unwrap()))
+        .map(|line| {
+            (line["offset"].as_u64().unwrap(), line["reason"].as_str().or(line["kind"].as_str()).unwrap())
+        })
         .collect();
     assert_eq!(
         kinds,
@@ -101,7 +98,10 @@ fn a_frame_inside_an_image_is_marked_and_one_after_a_damaged_frame_is_not() {
     let chunk = Downlink::ImageChunk(ImageChunk { index: protocol::ChunkIndex(3), data });
     let chunk = down(&chunk, 4, FrameForm::Full);
     let (lines, summary) = decode(&chunk, false);
-    assert_eq!(lines.iter().map(|line| line["nested"].clone()).collect::<Vec<_>>(), [json!(false), json!(true)]);
+    assert_eq!(
+        lines.iter().map(|line| line["nested"].clone()).collect::<Vec<_>>(),
+        [json!(false), json!(true)]
+    );
     assert_eq!((summary.frames, summary.nested, summary.skipped_bytes), (2, 1, 0));
 
     let (lines, summary) = decode(&chunk[..120], false);
@@ -140,7 +140,7 @@ fn a_payload_that_breaks_the_icd_is_shown_raw() {
 #[test]
 fn memory_does_not_grow_with_the_input() {
     let mut decoder = Decoder::new(false);
-    let junk: Vec<u8> = (0..100_000_u32).map(|i| (i * 7919 >> 3) as u8).collect();
+    let junk: Vec<u8> = (0..100_000_u32).map(|i| ((i * 7919) >> 3) as u8).collect();
     let mut lines = 0;
     for _ in 0..50 {
         decoder.push(&junk, &mut |_| lines += 1);

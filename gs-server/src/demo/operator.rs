@@ -38,7 +38,9 @@ impl Operator {
 
     /// Looks at the station and sends what is due.
     pub(super) async fn act(&mut self, status: &Status, now: Now) {
-        let Some(satellite) = status.satellites.first().filter(|satellite| satellite.in_contact) else { return };
+        let Some(satellite) = status.satellites.first().filter(|satellite| satellite.in_contact) else {
+            return;
+        };
         if !self.greeted {
             self.greeted = true;
             self.command(Telecommand::Ping).await;
@@ -58,7 +60,8 @@ impl Operator {
             }
             return;
         }
-        let Some(image) = satellite.image.as_ref().filter(|image| image.chunks > 0 && image.held == image.chunks)
+        let Some(image) =
+            satellite.image.as_ref().filter(|image| image.chunks > 0 && image.held == image.chunks)
         else {
             return;
         };
@@ -67,7 +70,8 @@ impl Operator {
                 if now.mono.0 >= since_us + NEXT_PICTURE_US && satellite.in_view != Some(false) {
                     self.captured = true;
                     let resolution = Resolution::Cif;
-                    let capture = Telecommand::CaptureImage { resolution, grey: false, strong_compression: false };
+                    let capture =
+                        Telecommand::CaptureImage { resolution, grey: false, strong_compression: false };
                     self.command(capture).await;
                 }
             }

@@ -119,8 +119,10 @@ impl Scene {
         config.links.iter_mut().for_each(|link| link.port = Some(port.display().to_string()));
         let token_file = config.token_file();
         let (tell_ready, is_ready) = oneshot::channel();
-        let link = LinkId::new("e22").map_err(|error| {
-            crate::config::ConfigError::Value { key: "links.name".into(), problem: error.to_string(), remedy: String::new() }
+        let link = LinkId::new("e22").map_err(|error| crate::config::ConfigError::Value {
+            key: "links.name".into(),
+            problem: error.to_string(),
+            remedy: String::new(),
         })?;
         let run_options = RunOptions {
             timer: Some(Arc::clone(&timer)),
@@ -153,7 +155,21 @@ impl Scene {
         };
         let starting = Mutex::new(Some(starting));
         let (stop, twin_stop) = (server_stop, twin_stop.drop_guard());
-        Ok(Self { stage, clock, timer, ready, asks, start_us, wall, ended, starting, stop, twin_stop, server, twin })
+        Ok(Self {
+            stage,
+            clock,
+            timer,
+            ready,
+            asks,
+            start_us,
+            wall,
+            ended,
+            starting,
+            stop,
+            twin_stop,
+            server,
+            twin,
+        })
     }
 
     /// The token that has held the clock since the beginning.

@@ -38,7 +38,8 @@ impl Sky {
         let in_view = self.passes.in_view(sky_us);
         if self.told != Some(in_view) {
             self.told = Some(in_view);
-            self.next_change_us = self.passes.next_change_us(sky_us).map(|us| us.saturating_sub(self.ahead_us));
+            self.next_change_us =
+                self.passes.next_change_us(sky_us).map(|us| us.saturating_sub(self.ahead_us));
             let until = self.next_change_us.map(|us| UtcUs(now.utc.0 + (us - now.mono.0).cast_signed()));
             if let Ok(satellite) = SatelliteId::new("pixelsat-1") {
                 let in_view = in_view.then_some(until);

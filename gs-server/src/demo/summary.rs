@@ -96,7 +96,11 @@ pub struct Hashes {
 }
 
 impl Summary {
-    pub(super) async fn gather(options: &DemoOptions, scene: &Scene, ending: &Ending) -> Result<Self, DemoError> {
+    pub(super) async fn gather(
+        options: &DemoOptions,
+        scene: &Scene,
+        ending: &Ending,
+    ) -> Result<Self, DemoError> {
         let store = &scene.ready.store;
         let twin = scene.twin_view().await?;
         let status = scene.ready.engine.status();
@@ -105,7 +109,9 @@ impl Summary {
         let image = store.images(&Scope::default(), &newest).await?.into_iter().next();
         let download = store.downloads(&Scope::default(), &newest).await?.into_iter().next();
         let ground = match &image {
-            Some(image) => store.image_bytes(image.id).await?.filter(|bytes| bytes.complete).map(|bytes| bytes.bytes),
+            Some(image) => {
+                store.image_bytes(image.id).await?.filter(|bytes| bytes.complete).map(|bytes| bytes.bytes)
+            }
             None => None,
         };
         let equal = ground.as_ref().is_some_and(|ground| *ground == twin.image && !ground.is_empty());
@@ -178,7 +184,8 @@ async fn chunks_received(store: &Store) -> Result<u64, DemoError> {
 }
 
 async fn commands(store: &Store) -> Result<BTreeMap<String, u64>, DemoError> {
-    let mut query = CommandQuery { page: Page { after: Some(0), before: None, limit: PAGE }, ..CommandQuery::default() };
+    let mut query =
+        CommandQuery { page: Page { after: Some(0), before: None, limit: PAGE }, ..CommandQuery::default() };
     let mut by_stage = BTreeMap::new();
     loop {
         let page = store.commands(&query).await?;

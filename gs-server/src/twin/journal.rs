@@ -43,8 +43,7 @@ impl JournalFile {
             .mode(0o600)
             .open(path)
             .map_err(fail)?;
-        flock(&file, FlockOperation::NonBlockingLockExclusive)
-            .map_err(|_| TwinError::InUse(path.into()))?;
+        flock(&file, FlockOperation::NonBlockingLockExclusive).map_err(|_| TwinError::InUse(path.into()))?;
         let mut text = String::new();
         file.read_to_string(&mut text).map_err(fail)?;
         let whole = text.rfind('\n').map_or(0, |at| at + 1);

@@ -192,10 +192,7 @@ fn watch_readable(master: Arc<OwnedFd>) -> io::Result<AsyncFd<Arc<OwnedFd>>> {
 
 /// Opens the slave for a moment: raw, no mark, empty. From then on the kernel tells whether anybody has it open.
 fn prepare(master: &OwnedFd) -> rustix::io::Result<()> {
-    let slave = ioctl_tiocgptpeer(
-        master,
-        OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC,
-    )?;
+    let slave = ioctl_tiocgptpeer(master, OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
     ioctl_tiocnxcl(&slave)?;
     let mut mode = tcgetattr(&slave)?;
     mode.make_raw();

@@ -51,7 +51,9 @@ fn every_verb_tells_what_it_does() {
 
 #[test]
 fn wrong_usage_is_2_and_no_verb_shows_the_help() {
-    for arguments in [&["dance"][..], &["decode", "--format", "morse"], &["serve"], &["twin", "serve", "--journal", "x"]] {
+    for arguments in
+        [&["dance"][..], &["decode", "--format", "morse"], &["serve"], &["twin", "serve", "--journal", "x"]]
+    {
         let (code, out, error) = run(arguments);
         assert_eq!((code, out.as_str()), (2, ""), "{error}");
         assert!(error.contains("--help"), "{error}");

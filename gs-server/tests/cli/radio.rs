@@ -8,9 +8,7 @@ fn a_module_is_probed_configured_and_watched() {
     let twin = Twin::start(&["--speed", "4", "--heartbeat-s", "5"]);
     let port = twin.port();
     let wiring = [port.as_str(), "--mode-pins", "software", "--aux", "absent"];
-    let radio = |verb: &str, more: &[&str]| {
-        run([&["radio", verb][..], &wiring, more].concat())
-    };
+    let radio = |verb: &str, more: &[&str]| run([&["radio", verb][..], &wiring, more].concat());
 
     let (code, out, error) = radio("probe", &["--json"]);
     assert_eq!(code, 0, "{error}");

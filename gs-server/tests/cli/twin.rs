@@ -60,7 +60,8 @@ impl Twin {
 
     fn restart(&mut self, more: &[&str]) -> serde_json::Value {
         let (port, journal) = (self.port(), self.file("twin.journal"));
-        let arguments = [&["twin", "serve", "--json", "--pty", &port, "--journal", &journal][..], more].concat();
+        let arguments =
+            [&["twin", "serve", "--json", "--pty", &port, "--journal", &journal][..], more].concat();
         let mut running = Running::start(&arguments);
         let ready = running.line();
         assert_eq!(ready["ready"], true);
@@ -179,7 +180,16 @@ fn a_server_in_another_process_commands_it_and_both_may_restart() {
     let config = config(twin.folder.path());
     let mut counters = Vec::new();
     for _round in 0..2 {
-        let mut server = Running::start(&["serve", "--config", &config, "--listen", "127.0.0.1:0", "--json", "--log", "warn"]);
+        let mut server = Running::start(&[
+            "serve",
+            "--config",
+            &config,
+            "--listen",
+            "127.0.0.1:0",
+            "--json",
+            "--log",
+            "warn",
+        ]);
         let ready = server.line();
         let address = ready["address"].as_str().unwrap().to_owned();
         let token = std::fs::read_to_string(twin.folder.path().join("data/token")).unwrap();

@@ -1,5 +1,10 @@
 //! `gs-server decode` over the vectors of the wire, which an independent program made.
-#![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot be set up has failed")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot be set up has failed"
+)]
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -88,7 +93,11 @@ fn check_field(vector: &str, fields: &Value, line: &str) {
             if wanted.is_finite() {
                 assert_eq!(found["value"].as_f64().unwrap() as f32, wanted, "{vector} {name}");
             } else {
-                assert_eq!((&found["value"], &found["invalid"]), (&Value::Null, &true.into()), "{vector} {name}");
+                assert_eq!(
+                    (&found["value"], &found["invalid"]),
+                    (&Value::Null, &true.into()),
+                    "{vector} {name}"
+                );
             }
         }
         "u" => assert_eq!(found["value"].to_string(), value, "{vector} {name}"),

@@ -1,5 +1,5 @@
 //! `gs-server demo` as scripts run it: the image comes home over a real pseudo-terminal, byte for byte.
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot be set up has failed")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::{Command, Stdio};

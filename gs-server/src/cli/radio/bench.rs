@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use mission::{MonoUs, Now};
 use radio::command::{self, Mode};
-use radio::driver::{AuxWiring, Diagnostic, Driver, DriverConfig, DriverInput, DriverOutput, DriverState, ModePins};
+use radio::driver::{
+    AuxWiring, Diagnostic, Driver, DriverConfig, DriverInput, DriverOutput, DriverState, ModePins,
+};
 use tokio::sync::mpsc;
 
 use super::Failure;
@@ -155,7 +157,9 @@ impl Bench {
                 self.log('>', &bytes, now);
                 self.port.write(bytes)
             }
-            DriverOutput::SetPins { m0, m1 } if matches!(self.driver.config().mode_pins, ModePins::Lines { .. }) => {
+            DriverOutput::SetPins { m0, m1 }
+                if matches!(self.driver.config().mode_pins, ModePins::Lines { .. }) =>
+            {
                 self.port.set_pins(m0, m1)
             }
             DriverOutput::PurgeInput => self.port.purge(),
@@ -224,11 +228,10 @@ struct RawLog {
 
 impl RawLog {
     fn create(path: &Path) -> Result<Self, Failure> {
-        let file = File::options()
-            .append(true)
-            .create(true)
-            .open(path)
-            .map_err(|error| Failure::doing(format!("raw log {} cannot be opened", path.display()), error))?;
+        let file =
+            File::options().append(true).create(true).open(path).map_err(|error| {
+                Failure::doing(format!("raw log {} cannot be opened", path.display()), error)
+            })?;
         Ok(Self { file, aux: None })
     }
 

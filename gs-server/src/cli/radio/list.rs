@@ -80,7 +80,9 @@ impl List {
             }
         }
         if ports.is_empty() {
-            return Err(Failure::failed("this machine has no serial port at present: is the adapter plugged in?"));
+            return Err(Failure::failed(
+                "this machine has no serial port at present: is the adapter plugged in?",
+            ));
         }
         Ok(Exit::Done)
     }

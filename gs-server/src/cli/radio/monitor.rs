@@ -66,11 +66,17 @@ impl Monitor {
                 }
                 Some(Notice::State(DriverState::Ready) | Notice::WouldChange(_)) => {
                     let rssi = bench.driver.facts().rssi_byte.unwrap_or(self.rssi);
-                    eprintln!("listening on {}, RSSI byte {}", self.wiring.port, if rssi { "on" } else { "off" });
+                    eprintln!(
+                        "listening on {}, RSSI byte {}",
+                        self.wiring.port,
+                        if rssi { "on" } else { "off" }
+                    );
                     decoder.get_or_insert_with(|| Decoder::new(rssi).with_hex(true));
                 }
                 Some(Notice::State(DriverState::Fault)) => {
-                    return Err(Failure::failed("the module does not work; the findings above name what to check"));
+                    return Err(Failure::failed(
+                        "the module does not work; the findings above name what to check",
+                    ));
                 }
                 Some(Notice::State(state)) => tracing::info!("{state:?}"),
                 Some(Notice::Finding(finding)) => eprintln!("{finding}"),
@@ -78,7 +84,9 @@ impl Monitor {
                     let decoder = decoder.get_or_insert_with(|| Decoder::new(self.rssi).with_hex(true));
                     decoder.push(&bytes, &mut |report| reports.push(report));
                 }
-                Some(Notice::Lost(reason)) => return Err(Failure::failed(format!("the port is gone: {reason}"))),
+                Some(Notice::Lost(reason)) => {
+                    return Err(Failure::failed(format!("the port is gone: {reason}")));
+                }
             }
             for report in reports.drain(..) {
                 frames += u64::from(matches!(report, Report::Frame(_)));

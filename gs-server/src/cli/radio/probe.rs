@@ -44,7 +44,11 @@ pub struct Configure {
 
 impl Probe {
     pub(super) fn run(self) -> Result<Exit, Failure> {
-        let (module, _) = runtime()?.block_on(bring_up(&self.wiring, &self.settings, Change { dry: true, ..Change::default() }))?;
+        let (module, _) = runtime()?.block_on(bring_up(
+            &self.wiring,
+            &self.settings,
+            Change { dry: true, ..Change::default() },
+        ))?;
         tell(&module, self.wiring.json)?;
         if module.answered {
             Ok(Exit::Done)
@@ -96,7 +100,9 @@ async fn bring_up(
 ) -> Result<(Module, DriverState), Failure> {
     let section = wiring.section()?;
     if section.mode_pins() == ModePinWiring::Strapped {
-        return Err(Failure::usage("a strapped module cannot be asked anything; wire M0 and M1, or see `radio monitor`"));
+        return Err(Failure::usage(
+            "a strapped module cannot be asked anything; wire M0 and M1, or see `radio monitor`",
+        ));
     }
     let mut config = settings.driver_config(&section)?;
     config.save_to_flash = change.save;
