@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt as _;
 use futures_util::future::BoxFuture;
-use mission::{Entropy, Intent, LinkId, Principal, Snapshot, StationConfig};
+use mission::{Clock as _, Entropy, Intent, LinkId, Principal, Snapshot, StationConfig, UtcUs};
 use protocol::Key;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
@@ -29,7 +29,7 @@ use crate::keys::{self, KeyError};
 use crate::lifecycle::{Lifecycle, TaskFailure};
 use crate::links::{self, LinkParts};
 use crate::storage::reserve::ReserveError;
-use crate::storage::{Store, StoreError, StoreOptions};
+use crate::storage::{EventQuery, Page, Store, StoreError, StoreOptions};
 
 /// What requests under way may take at the end.
 const API_END: Duration = Duration::from_millis(600);
@@ -185,10 +185,16 @@ pub async fn run_with(
     let keys = load_keys(&config)?;
     let station = station_config(&config, &keys)?;
     drop(keys);
-    let timer = clock_for(&config, timer)?;
+    if timer.as_ref().is_some_and(|timer| timer.is_simulated()) && !config.is_simulated() {
+        return Err(RunError::ClockKind);
+    }
     // A stepped clock stands still until all actors run.
-    let starting = timer.busy("start of the server");
+    let starting = timer.as_ref().map(|timer| timer.busy("start of the server"));
     let store = open_store(&config, store).await?;
+    let timer = match timer {
+        Some(timer) => timer,
+        None => clock_for(&config, newest_event(&store).await?),
+    };
     let address = listener
         .local_addr()
         .map_err(|source| RunError::Io { what: "the listener has no address", source })?;
@@ -317,15 +323,25 @@ fn load_keys(config: &Config) -> Result<BTreeMap<String, Key>, RunError> {
     Ok(loaded)
 }
 
-fn clock_for(config: &Config, brought: Option<Arc<dyn Timer>>) -> Result<Arc<dyn Timer>, RunError> {
-    let timer = brought.unwrap_or_else(|| match config.simulation {
-        Some(simulation) => Arc::new(ScaledClock::new(simulation.speed)),
-        None => Arc::new(SystemClock::new()),
-    });
-    if timer.is_simulated() && !config.is_simulated() {
-        return Err(RunError::ClockKind);
+/// The clock of the configuration. A simulated one that ran ahead of life goes on where the last run left it: to a
+/// restart, records of the future would be answers that are still to come.
+fn clock_for(config: &Config, last: Option<UtcUs>) -> Arc<dyn Timer> {
+    let Some(simulation) = config.simulation else { return Arc::new(SystemClock::new()) };
+    let clock = ScaledClock::new(simulation.speed);
+    match last.filter(|last| *last > clock.now().utc) {
+        Some(last) => Arc::new(ScaledClock::starting_at(simulation.speed, last)),
+        None => Arc::new(clock),
     }
-    Ok(timer)
+}
+
+/// When the newest event of the archive happened. Owns what it reads with, as [`snapshot`] does.
+fn newest_event(store: &Store) -> BoxFuture<'static, Result<Option<UtcUs>, StoreError>> {
+    let store = store.clone();
+    let query = EventQuery {
+        page: Page { before: Some(i64::MAX), limit: 1, ..Page::default() },
+        ..EventQuery::default()
+    };
+    async move { Ok(store.events(&query).await?.first().map(|event| event.record.at)) }.boxed()
 }
 
 async fn open_store(config: &Config, brought: Option<Store>) -> Result<Store, RunError> {

@@ -30,9 +30,8 @@ pub struct Folder {
 }
 
 /// The bytes of the key in each folder.
-pub const KEY: [u8; 16] = [
-    0xC0, 0xFF, 0xEE, 0x5E, 0xC2, 0xE7, 0x13, 0x37, 0xBA, 0xDC, 0xAB, 0x1E, 0xDE, 0xFA, 0xCE, 0xD5,
-];
+pub const KEY: [u8; 16] =
+    [0xC0, 0xFF, 0xEE, 0x5E, 0xC2, 0xE7, 0x13, 0x37, 0xBA, 0xDC, 0xAB, 0x1E, 0xDE, 0xFA, 0xCE, 0xD5];
 
 impl Default for Folder {
     fn default() -> Self {
@@ -200,7 +199,8 @@ pub fn free_address() -> SocketAddr {
     static NEXT: AtomicU16 = AtomicU16::new(0);
     (0..9_000)
         .map(|_| {
-            let offset = NEXT.fetch_add(1, Ordering::Relaxed).wrapping_add((std::process::id() % 9_000) as u16 * 7);
+            let offset =
+                NEXT.fetch_add(1, Ordering::Relaxed).wrapping_add((std::process::id() % 9_000) as u16 * 7);
             SocketAddr::from(([127, 0, 0, 1], 21_000 + offset % 9_000))
         })
         .find(|address| TcpListener::bind(address).is_ok())

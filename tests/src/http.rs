@@ -56,7 +56,14 @@ impl Answer {
     #[must_use]
     pub fn problem(&self) -> String {
         let problem: api::Problem = self.json();
-        problem.known_kind().map(|kind| kind.urn()).unwrap_or_default().rsplit(':').next().unwrap_or("").to_owned()
+        problem
+            .known_kind()
+            .map(|kind| kind.urn())
+            .unwrap_or_default()
+            .rsplit(':')
+            .next()
+            .unwrap_or("")
+            .to_owned()
     }
 }
 
@@ -86,8 +93,11 @@ impl Client {
     /// No whole answer: nobody knows whether it counts, ask again under the same key.
     pub fn post(&self, path: &str, key: &str, body: &str) -> io::Result<Answer> {
         let token = format!("Bearer {}", self.token);
-        let headers =
-            [("authorization", token.as_str()), ("idempotency-key", key), ("content-type", "application/json")];
+        let headers = [
+            ("authorization", token.as_str()),
+            ("idempotency-key", key),
+            ("content-type", "application/json"),
+        ];
         self.ask("POST", path, &headers, body.as_bytes())
     }
 

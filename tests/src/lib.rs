@@ -14,11 +14,7 @@
 //!
 //! Everything here is as far outside the server as an operator is: it knows the wire types (`api`), the radio link
 //! (`protocol`) and the twin's journal (`satellite`), and nothing of the server's inside.
-#![expect(
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot be set up has failed, loudly"
-)]
+#![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot be set up has failed, loudly")]
 
 pub mod binary;
 pub mod folder;

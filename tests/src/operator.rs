@@ -64,7 +64,8 @@ impl Operator {
 
     /// The newest download; outer `None` when nobody answers.
     fn newest_download(&self) -> Option<Option<DownloadView>> {
-        let answer = self.client.get("/api/v1/downloads?limit=1").ok().filter(|answer| answer.status == 200)?;
+        let answer =
+            self.client.get("/api/v1/downloads?limit=1").ok().filter(|answer| answer.status == 200)?;
         let page: Page<DownloadView> = answer.json();
         Some(page.items.into_iter().next())
     }

@@ -98,7 +98,8 @@ impl Process {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.pid())).expect("procfs");
         let after_name = stat.rsplit_once(')').expect("a name in brackets").1;
         // Fields 14 and 15 of proc(5), in ticks of 10 ms.
-        let ticks: u64 = after_name.split_whitespace().skip(11).take(2).map(|f| f.parse::<u64>().unwrap_or(0)).sum();
+        let ticks: u64 =
+            after_name.split_whitespace().skip(11).take(2).map(|f| f.parse::<u64>().unwrap_or(0)).sum();
         Duration::from_millis(10 * ticks)
     }
 }
@@ -184,7 +185,8 @@ impl Server {
             pause(Duration::from_millis(5));
         }
         let ready_after = began.elapsed();
-        client.token = std::fs::read_to_string(folder.data().join("token")).expect("a token").trim().to_owned();
+        client.token =
+            std::fs::read_to_string(folder.data().join("token")).expect("a token").trim().to_owned();
         Self { process, client, ready_after }
     }
 
@@ -202,7 +204,10 @@ impl Server {
     /// # Panics
     /// When it does not come in time.
     pub fn until_link(&self, state: &str, limit: Duration) -> Duration {
-        until(&format!("the link is {state}"), limit, || (self.station().links[0].state == state).then_some(())).1
+        until(&format!("the link is {state}"), limit, || {
+            (self.station().links[0].state == state).then_some(())
+        })
+        .1
     }
 
     /// Ends it in order.
@@ -238,7 +243,12 @@ impl Twin {
     #[must_use]
     pub fn start(folder: &Folder, arguments: &[&str]) -> Self {
         let mut command = gs_server(["twin", "serve", "--json", "--pty"]);
-        command.arg(folder.port()).arg("--journal").arg(folder.journal()).arg("--key").arg(folder.file("twin.key"));
+        command
+            .arg(folder.port())
+            .arg("--journal")
+            .arg(folder.journal())
+            .arg("--key")
+            .arg(folder.file("twin.key"));
         command.arg("--heartbeat-s").arg(folder.heartbeat_s.to_string());
         if let Some(speed) = folder.speed {
             command.arg("--speed").arg(speed.to_string());

@@ -61,7 +61,9 @@ impl Pty {
                 Ok(count) => all.extend_from_slice(&piece[..count]),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return all,
                 // Nobody has the other end open.
-                Err(error) if error.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error()) => return all,
+                Err(error) if error.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error()) => {
+                    return all;
+                }
                 Err(error) => panic!("{error}"),
             }
         }

@@ -92,7 +92,8 @@ impl Watcher {
             StreamMessage::Hello { last_sequence, reset, .. } => self.change(|p| {
                 let known = p.events.keys().next_back().copied().unwrap_or(0);
                 if reset || last_sequence < known {
-                    p.contradictions.push(format!("event {known} was told; after a restart the last is {last_sequence}"));
+                    p.contradictions
+                        .push(format!("event {known} was told; after a restart the last is {last_sequence}"));
                 }
             }),
             StreamMessage::Event(event) => {

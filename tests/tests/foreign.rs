@@ -101,8 +101,16 @@ fn satellite(folder: &Folder) -> Process {
     command.args(["--frame", "0.3", "--period", &PERIOD_S.to_string()]);
     let log = folder.file("satellite.log");
     let told = std::fs::File::create(&log).expect("a log file");
-    let process = Process::start({ command.stdout(told); command }, &log);
-    until("the foreign satellite is ready", Duration::from_secs(30), || process.log().contains("ready").then_some(()));
+    let process = Process::start(
+        {
+            command.stdout(told);
+            command
+        },
+        &log,
+    );
+    until("the foreign satellite is ready", Duration::from_secs(30), || {
+        process.log().contains("ready").then_some(())
+    });
     process
 }
 

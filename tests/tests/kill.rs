@@ -22,8 +22,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use satellite::JournalEntry;
 
-/// Simulated seconds per second: an image takes about two seconds.
-const SPEED: f64 = 40.0;
+/// Simulated seconds per second: an image takes a few seconds, and a machine that is late by 50 ms is late by one second.
+const SPEED: f64 = 20.0;
 /// A restart takes no longer; the test fails at ten times as much, for the machine may be busy.
 const READY_WITHIN: Duration = Duration::from_secs(2);
 
@@ -38,7 +38,7 @@ fn kill_nine_at_any_moment_loses_nothing_that_was_told_and_repeats_no_nonce() {
     eprintln!("KILLS={kills} KILL_SEED={seed}");
     let mut folder = Folder::new();
     folder.speed = Some(SPEED);
-    folder.heartbeat_s = 20;
+    folder.heartbeat_s = 10;
     let mut twin = Twin::start(&folder, &["--seed", &seed.to_string()]);
 
     let first = Server::start(&folder);
@@ -48,7 +48,10 @@ fn kill_nine_at_any_moment_loses_nothing_that_was_told_and_repeats_no_nonce() {
     let (watching, operating) = {
         let (watcher, following, done) = (watcher.clone(), client.clone(), Arc::clone(&done));
         let operator = Operator::new(client.clone(), seed);
-        (std::thread::spawn(move || watcher.follow(&following)), std::thread::spawn(move || operator.work(&done)))
+        (
+            std::thread::spawn(move || watcher.follow(&following)),
+            std::thread::spawn(move || operator.work(&done)),
+        )
     };
     let began = now();
     let ready = kill_again_and_again(&folder, first, &watcher, kills, seed);
@@ -62,16 +65,25 @@ fn kill_nine_at_any_moment_loses_nothing_that_was_told_and_repeats_no_nonce() {
     watching.join().expect("the watcher");
     assert!(twin.process.ended().is_none(), "the twin must live through it all");
 
-    let commands = commands(&client);
+    // The station goes on: what was radiated is looked up before what is stored, and what was sent after it.
+    let earlier = journal::read(&folder.journal());
     let events: Vec<EventView> = client.all("/api/v1/events");
     let frames: Vec<FrameView> = client.all("/api/v1/frames");
+    let commands = commands(&client);
     let entries = journal::read(&folder.journal());
-    let radiated = radiated_is_stored(&folder, &entries, &commands);
+    let radiated = radiated_is_stored(&folder, &earlier, &commands);
     let bridges = held_chunks_are_not_requested(&events, &frames, &commands);
     let published = published_is_kept(&watcher, &events, &frames, &entries);
     acknowledged_exists_once(&client, &operator, &commands);
     let images = images_are_the_satellites(&client, &entries);
     assert!(images > 0, "not one image came home");
+    let in_hand = in_hand_at_kills(&events);
+    if kills >= 100 {
+        assert!(
+            in_hand["sealed"] + in_hand["radiating"] >= 10,
+            "the kills met too few commands in hand: {in_hand:?}"
+        );
+    }
     last.stop();
 
     let slowest = ready.iter().max().copied().unwrap_or_default();
@@ -79,7 +91,7 @@ fn kill_nine_at_any_moment_loses_nothing_that_was_told_and_repeats_no_nonce() {
     eprintln!(
         "{kills} kills in {took:.1?} (0 violations: below {:.2} % at 95 %); ready again after {:.0?} in the middle, {slowest:.0?} at most, \
          {late} times above {READY_WITHIN:?}; published {published:?} events and frames; radiated {radiated}, bridges {bridges}, \
-         images {images}; {} intents acknowledged, {} asked again",
+         images {images}; in hand when killed {in_hand:?}; {} intents acknowledged, {} asked again",
         300.0 / kills as f64,
         middle(&ready),
         operator.acknowledged.len(),
@@ -95,7 +107,13 @@ fn middle(times: &[Duration]) -> Duration {
 }
 
 /// Kills and starts; how long each start took that was let come to its end.
-fn kill_again_and_again(folder: &Folder, first: Server, watcher: &Watcher, kills: u64, seed: u64) -> Vec<Duration> {
+fn kill_again_and_again(
+    folder: &Folder,
+    first: Server,
+    watcher: &Watcher,
+    kills: u64,
+    seed: u64,
+) -> Vec<Duration> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut ready = vec![first.ready_after];
     let mut life = Some(first);
@@ -123,10 +141,13 @@ fn kill_again_and_again(folder: &Folder, first: Server, watcher: &Watcher, kills
             // Shortly after a command reached a stage: between seal, witness, mark, transmission and answer.
             let before = watcher.stages.load(Ordering::Relaxed);
             let began = now();
-            while watcher.stages.load(Ordering::Relaxed) == before && began.elapsed() < Duration::from_millis(1_500) {
+            while watcher.stages.load(Ordering::Relaxed) == before
+                && began.elapsed() < Duration::from_millis(1_500)
+            {
                 pause(Duration::from_millis(1));
             }
-            pause(Duration::from_micros(random.random_range(0..60_000)));
+            let most_us = if random.random_bool(0.6) { 5_000 } else { 60_000 };
+            pause(Duration::from_micros(random.random_range(0..most_us)));
         }
         server.process.kill9();
     }
@@ -145,37 +166,85 @@ fn finish_an_image(client: &Client) {
 /// Every command with its stages.
 fn commands(client: &Client) -> BTreeMap<u64, CommandView> {
     let list: Vec<CommandView> = client.all("/api/v1/commands");
-    list.iter().map(|command| (command.id, client.read(&format!("/api/v1/commands/{}", command.id)))).collect()
+    list.iter()
+        .map(|command| (command.id, client.read(&format!("/api/v1/commands/{}", command.id))))
+        .collect()
+}
+
+/// How many kills met a command in each stage between the queue and the answer.
+fn in_hand_at_kills(events: &[EventView]) -> BTreeMap<&'static str, usize> {
+    let mut found = BTreeMap::from(["sealed", "radiating", "radiated"].map(|stage| (stage, 0)));
+    let mut stages: HashMap<u64, &str> = HashMap::new();
+    for event in events {
+        match (event.kind.as_str(), event.command) {
+            ("command-stage", Some(id)) => {
+                let words = event.message.split(" is ").nth(1).unwrap_or_default();
+                stages.insert(id, words.split(':').next().unwrap_or_default());
+            }
+            ("station", _) => {
+                for (stage, count) in &mut found {
+                    *count += stages.values().filter(|at| *at == stage).count();
+                }
+                // What a start finds, it settles or goes on with; counted once.
+                stages.clear();
+            }
+            _ => {}
+        }
+    }
+    found
 }
 
 /// Each packet on the air carries a nonce of its own and was in the archive, marked, before; how many there were.
-fn radiated_is_stored(folder: &Folder, entries: &[JournalEntry], commands: &BTreeMap<u64, CommandView>) -> usize {
+fn radiated_is_stored(
+    folder: &Folder,
+    entries: &[JournalEntry],
+    commands: &BTreeMap<u64, CommandView>,
+) -> usize {
     // "counter C, tag T" of the stage `sealed`, where the stage `radiating` of the same attempt follows.
     let mut marked: HashMap<String, &CommandView> = HashMap::new();
     for command in commands.values() {
         let stages = command.stages.as_deref().unwrap_or_default();
         for sealed in stages.iter().filter(|stage| stage.stage == "sealed") {
             if stages.iter().any(|stage| stage.stage == "radiating" && stage.attempt == sealed.attempt) {
-                assert!(marked.insert(sealed.why.clone(), command).is_none(), "{} was sealed twice", sealed.why);
+                assert!(
+                    marked.insert(sealed.why.clone(), command).is_none(),
+                    "{} was sealed twice",
+                    sealed.why
+                );
             }
         }
     }
-    let packets = journal::radiated(entries);
+    let (packets, chatter): (Vec<&[u8]>, Vec<&[u8]>) = journal::radiated(entries)
+        .into_iter()
+        .partition(|packet| packet.windows(8).any(|eight| eight == b"DESTINY_"));
+    // A twin that this machine let wait for a second of simulated time finds the mode switch and its repetitions as one
+    // burst, which no module takes for a switch. It leads to no satellite: its first bytes are read as an address.
+    for packet in chatter {
+        assert!(is_mode_switch(packet), "neither a telecommand nor a mode switch: {}", hex::encode(packet));
+    }
     let mut nonces = HashSet::new();
     for packet in &packets {
-        assert_eq!(packet.len(), 240, "a cut packet was radiated");
+        assert_eq!(packet.len(), 240, "a cut packet was radiated: {}", hex::encode(packet));
         let sealed = SealedUplink::from_bytes((*packet).try_into().expect("240 bytes")).expect("an uplink");
         let nonce = sealed.nonce();
         assert!(nonces.insert(nonce), "nonce {nonce} was radiated twice");
         let opened = open(&folder.key(), &sealed).expect("our key");
         let tag = opened.tag().expect("a tag");
         let why = format!("counter {}, tag {tag}", nonce.counter());
-        let command = marked.get(&why).unwrap_or_else(|| panic!("radiated and not in the archive: {why}"));
+        let command = marked.get(&why).unwrap_or_else(|| {
+            let of_it = commands.values().filter(|c| c.stages.iter().flatten().any(|stage| stage.why == why));
+            panic!("{why}: radiated and not in the archive as radiating: {:#?}", of_it.collect::<Vec<_>>())
+        });
         let telecommand = opened.telecommand().expect("a telecommand");
         assert_eq!(telecommand.name(), command.command, "{why}");
         assert_eq!(api::telecommand::arguments(&telecommand), command.arguments, "{why}");
     }
     packets.len()
+}
+
+/// Whether these are pieces of `C0 C1 C2 C3 02 MODE` and nothing else.
+fn is_mode_switch(packet: &[u8]) -> bool {
+    packet.iter().all(|byte| matches!(byte, 0xC0..=0xC3 | 0x00..=0x03))
 }
 
 /// No chunk is asked for while it is held, unless a bridge was justified; the number of bridges.
@@ -200,10 +269,15 @@ fn held_chunks_are_not_requested(
     for event in events {
         match event.kind.as_str() {
             "image-declared" if event.image.is_some() => held.clear(),
-            "chunk-received" if event.image.is_some() => held.extend(event.frame.and_then(|id| chunk_of.get(&id))),
-            "command-stage" if event.message.contains(" is queued") || event.message.contains(" is radiating") => {
+            "chunk-received" if event.image.is_some() => {
+                held.extend(event.frame.and_then(|id| chunk_of.get(&id)))
+            }
+            "command-stage"
+                if event.message.contains(" is queued") || event.message.contains(" is radiating") =>
+            {
                 let Some(command) = event.command.and_then(|id| commands.get(&id)) else { continue };
-                let again: Vec<u16> = asked(command).into_iter().filter(|index| held.contains(index)).collect();
+                let again: Vec<u16> =
+                    asked(command).into_iter().filter(|index| held.contains(index)).collect();
                 assert!(
                     again.is_empty() || bridged.contains(&command.id),
                     "event {}: {} - asks for {again:?}, which are held",
@@ -271,8 +345,11 @@ fn acknowledged_exists_once(client: &Client, operator: &Operator, commands: &BTr
     let ids: Vec<u64> = operator.acknowledged.values().filter_map(|said| said.outcome.command).collect();
     let distinct: BTreeSet<u64> = ids.iter().copied().collect();
     assert_eq!(distinct.len(), ids.len(), "two intents became one command");
-    let theirs: BTreeSet<u64> =
-        commands.values().filter(|command| command.principal == "operator").map(|command| command.id).collect();
+    let theirs: BTreeSet<u64> = commands
+        .values()
+        .filter(|command| command.principal == "operator")
+        .map(|command| command.id)
+        .collect();
     // The one that was under way when the operator went home may be there without an answer.
     let unanswered: Vec<u64> = theirs.difference(&distinct).copied().collect();
     assert!(unanswered.len() <= 1, "commands that nobody asked for, or twice: {unanswered:?}");

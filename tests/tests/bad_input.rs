@@ -1,0 +1,1 @@
+//! Bad input, each against the real `gs-server` process.

@@ -1,0 +1,1 @@
+//! A known key occurs nowhere outside its own file.
