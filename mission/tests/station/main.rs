@@ -1,0 +1,19 @@
+//! The station engine, driven by hand: a world that confirms what it is asked for, late or never, and writes down
+//! everything in the order in which it happened. No satellite here: what it would say is said by the test.
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot be set up has failed"
+)]
+
+mod at_most_once;
+mod chaos;
+mod clocks;
+mod gates;
+mod images;
+mod locks;
+mod order;
+mod restarts;
+mod storage;
+mod world;
