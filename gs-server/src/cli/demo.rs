@@ -168,8 +168,7 @@ struct Bar {
 impl Bar {
     fn new() -> Self {
         let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
-        let style = ProgressStyle::with_template("{prefix} [{bar:30}] {pos}/{len} chunks  {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        bar.set_style(style("{prefix} {msg}"));
         Self { bar }
     }
 
@@ -183,10 +182,19 @@ impl Bar {
         let sky = if progress.in_view { "in view" } else { "below" };
         self.bar.set_prefix(format!("T+{hours:02}:{minutes:02}:{seconds:02} {sky:7}"));
         if let Some(image) = &satellite.image {
+            if self.bar.length() == Some(0) {
+                self.bar.set_style(style("{prefix} [{bar:30}] {pos}/{len} chunks  {msg}"));
+            }
             self.bar.set_length(image.chunks.into());
             self.bar.set_position(image.held.into());
         }
         let frames = progress.status.links.first().map_or(0, |link| link.frames);
         self.bar.set_message(format!("{frames} frames  {}", satellite.uplink));
     }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template)
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .progress_chars("=> ")
 }

@@ -60,13 +60,13 @@ pub struct Serve {
     /// Whether the satellite stands in the sky always, or passes every 95 minutes
     #[arg(long, value_enum, default_value_t = Mode::Always)]
     mode: Mode,
+    /// One JSON object when ready, one at the end
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     sky: Sky,
     #[command(flatten)]
     satellite: Satellite,
-    /// One JSON object when ready, one at the end
-    #[arg(long, help_heading = "Options")]
-    json: bool,
 }
 
 /// What the channel does; the same for `demo`.

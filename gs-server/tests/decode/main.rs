@@ -81,6 +81,12 @@ fn every_downlink_vector_comes_out_with_its_fields() {
 fn check_field(vector: &str, fields: &Value, line: &str) {
     let mut words = line.split(' ');
     let (name, _place, value) = (words.next().unwrap(), words.next().unwrap(), words.next().unwrap());
+    // Entries of lists are written `[0]event.time` there.
+    let name = match name.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+        Some((index, name)) => format!("{name}[{index}]"),
+        None => name.to_owned(),
+    };
+    let name = name.as_str();
     let unit = words.next().filter(|word| *word != "#");
     let found = fields.get(name).unwrap_or_else(|| panic!("{vector}: no {name} in {fields}"));
     if let Some(unit) = unit {

@@ -29,17 +29,17 @@ pub struct Probe {
 pub struct Configure {
     #[command(flatten)]
     wiring: Wiring,
-    #[command(flatten)]
-    settings: Settings,
     /// Write what differs; into RAM, until the power goes
-    #[arg(long, help_heading = "Options")]
+    #[arg(long)]
     write: bool,
     /// With --write: into flash
-    #[arg(long, help_heading = "Options", requires = "write")]
+    #[arg(long, requires = "write")]
     save: bool,
     /// Let modes be changed by a command on the data line, so that mode_pins = "software" works later
-    #[arg(long, help_heading = "Options")]
+    #[arg(long)]
     software_switch: bool,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 impl Probe {
