@@ -9,6 +9,7 @@
 //! | [`pty`] | a pseudo-terminal, for tests that play the radio themselves |
 //! | [`stream`] | a follower of the WebSocket |
 //! | [`journal`] | what the twin wrote down: the far end's own witness |
+//! | [`strace`] | system calls, as strace tells them |
 //! | [`watch`], [`operator`] | somebody who remembers what the server published; somebody who commands |
 //! | [`wait`] | waiting for the real world |
 //!
@@ -23,6 +24,7 @@ pub mod journal;
 pub mod operator;
 pub mod process;
 pub mod pty;
+pub mod strace;
 pub mod stream;
 pub mod wait;
 pub mod watch;
