@@ -3,6 +3,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`elements`] | SGP4 mean elements of one object, with every field of its OMM or TLE |
+//! | [`formats`] | reading and writing elements: OMM as JSON, CSV, XML and KVN, and TLE |
 //! | [`propagator`] | SGP4 and SDP4: elements and a time to position and velocity in TEME |
 //! | [`batch`] | near-earth SGP4 for many instants or objects at once |
 //! | [`time`] | UTC instants in microseconds, and UT1-UTC |
@@ -18,9 +19,10 @@
 //! Everything is a pure function of its arguments: no clock, no file, no network, no randomness. Angles are radians
 //! and units SI or km inside; names tell unit and frame (`r_teme_km`, `elevation_deg`).
 
-pub mod doppler;
 pub mod batch;
+pub mod doppler;
 pub mod elements;
+pub mod formats;
 pub mod frames;
 pub mod geodetic;
 pub mod gravity;

@@ -1,6 +1,7 @@
 //! Instants in UTC, and how far the Earth has turned at them.
 
 use std::fmt;
+use std::str::FromStr;
 
 /// Microseconds in a minute.
 const MINUTE_US: f64 = 60e6;
@@ -117,6 +118,86 @@ pub struct Ut1Error {
     pub found_s: f64,
 }
 
+/// Text that is no instant in UTC.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "'{found}' is no instant in UTC: write 2026-11-22T05:19:25.123456Z or, with the day of the year, 2026-326T05:19:25Z"
+)]
+pub struct InstantError {
+    /// The text, cut short if it is long.
+    pub found: String,
+}
+
+impl FromStr for UtcInstant {
+    type Err = InstantError;
+
+    /// Reads `YYYY-MM-DDThh:mm:ss` or `YYYY-DDDThh:mm:ss`, with or without a fraction (rounded to a microsecond) and with
+    /// or without Z: UTC in any case. Other offsets are refused.
+    fn from_str(text: &str) -> Result<Self, InstantError> {
+        read_instant(text.trim())
+            .filter(|instant| (Self::EARLIEST..Self::LATEST).contains(instant))
+            .ok_or_else(|| InstantError { found: text.chars().take(40).collect() })
+    }
+}
+
+fn read_instant(text: &str) -> Option<UtcInstant> {
+    let text = text.strip_suffix('Z').unwrap_or(text);
+    let (date, clock) = text.split_once('T')?;
+    let mut parts = date.split('-');
+    let year = digits(parts.next()?, 4)?;
+    let days = match (parts.next()?, parts.next(), parts.next()) {
+        (day_of_year, None, None) => {
+            let day = digits(day_of_year, 3)?;
+            (1..=days_in_year(year)).contains(&day).then(|| days_from_civil(year, 1, 1) + day - 1)?
+        }
+        (month, Some(day), None) => {
+            let date = (year, digits(month, 2)?, digits(day, 2)?);
+            let days = days_from_civil(date.0, date.1, date.2);
+            // 31 November and month 13 come back as another date.
+            (civil_from_days(days) == date).then_some(days)?
+        }
+        _ => return None,
+    };
+    let mut parts = clock.split(':');
+    let (hour, minute) = (digits(parts.next()?, 2)?, digits(parts.next()?, 2)?);
+    let (second, fraction) = parts.next()?.split_once('.').map_or_else(
+        || (clock.rsplit(':').next().unwrap_or_default(), ""),
+        |(second, fraction)| (second, fraction),
+    );
+    let second = digits(second, 2)?;
+    // 60 is a leap second: on this scale it is the first of the next minute.
+    if parts.next().is_some() || hour > 23 || minute > 59 || second > 60 {
+        return None;
+    }
+    let us = decimals_as_parts(fraction, 1_000_000)?;
+    Some(UtcInstant(days * DAY_US + ((hour * 60 + minute) * 60 + second) * 1_000_000 + us))
+}
+
+/// Exactly `count` digits as a number.
+fn digits(text: &str, count: usize) -> Option<i64> {
+    (text.len() == count && text.bytes().all(|byte| byte.is_ascii_digit())).then(|| text.parse().ok())?
+}
+
+/// Digits after a decimal point as a count of `parts` in one, rounded to the nearest. No digits are 0.
+pub(crate) fn decimals_as_parts(digits: &str, parts: i64) -> Option<i64> {
+    if !digits.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    // 18 digits are more than anybody publishes and all that i64 holds.
+    let digits = digits.get(..18).unwrap_or(digits);
+    if digits.is_empty() {
+        return Some(0);
+    }
+    let scale = 10_i128.pow(u32::try_from(digits.len()).ok()?);
+    let value = i128::from(digits.parse::<i64>().ok()?) * i128::from(parts);
+    i64::try_from((value + scale / 2).div_euclid(scale)).ok()
+}
+
+/// 365 or 366.
+pub(crate) const fn days_in_year(year: i64) -> i64 {
+    days_from_civil(year + 1, 1, 1) - days_from_civil(year, 1, 1)
+}
+
 impl fmt::Display for UtcInstant {
     /// RFC 3339 with microseconds and Z.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -131,7 +212,6 @@ impl fmt::Display for UtcInstant {
 /// Days since 1970-01-01 of a day of the Gregorian calendar (month 1-12, day 1-31).
 ///
 /// Howard Hinnant's `days_from_civil`, <https://howardhinnant.github.io/date_algorithms.html>.
-#[cfg_attr(not(test), expect(dead_code, reason = "the readers of dates come next"))]
 pub(crate) const fn days_from_civil(year: i64, month: i64, day: i64) -> i64 {
     let shifted = if month <= 2 { year - 1 } else { year };
     let era = shifted.div_euclid(400);
@@ -175,6 +255,35 @@ mod tests {
     fn instant_is_written_as_rfc_3339() {
         assert_eq!(UtcInstant::from_unix_us(-1).to_string(), "1969-12-31T23:59:59.999999Z");
         assert_eq!(UtcInstant::from_unix_us(J2000_US).to_string(), "2000-01-01T12:00:00.000000Z");
+    }
+
+    #[test]
+    fn instants_are_read_in_both_forms_of_ccsds() {
+        let read = |text: &str| text.parse::<UtcInstant>().map(|instant| instant.to_string());
+        assert_eq!(read("2020-05-27T18:57:31.456608").unwrap(), "2020-05-27T18:57:31.456608Z");
+        assert_eq!(read("2020-148T18:57:31.456608Z").unwrap(), "2020-05-27T18:57:31.456608Z");
+        assert_eq!(read("2024-366T00:00:00").unwrap(), "2024-12-31T00:00:00.000000Z");
+        assert_eq!(read("2016-12-31T23:59:60Z").unwrap(), "2017-01-01T00:00:00.000000Z");
+        assert_eq!(read("2020-01-01T00:00:00.1234565").unwrap(), "2020-01-01T00:00:00.123457Z");
+        for wrong in [
+            "",
+            "2020-05-27",
+            "2020-13-01T00:00:00",
+            "2020-02-30T00:00:00",
+            "2023-366T00:00:00",
+            "2020-000T00:00:00",
+            "2020-05-27T24:00:00",
+            "2020-05-27T00:00",
+            "2020-05-27T00:00:00+02:00",
+            "2020-05-27T00:00:00.1e3",
+            "1850-01-01T00:00:00",
+            "9999-12-31T00:00:00",
+            "2020-05-27T+1:00:00",
+            "T",
+            "--T::",
+        ] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]
