@@ -9,12 +9,16 @@
 //! | `intake` | bytes to frames, frames to records |
 //! | `packets` | what a packet changes |
 //! | `gate` | whether the uplink may be used now, and if not, when |
-//! | `uplink` | one exchange at a time: seal, witness, mark, transmit, await |
+//! | `wanted` | whether a command that waits may still go on |
+//! | `uplink` | one exchange at a time: seal, witness, mark, transmit |
+//! | `witness` | the counter outside the database |
+//! | `answer` | after the hand-over: the radio's word, the satellite's answer |
 //! | `outcome` | stages: how commands end |
 //! | `download` | what to ask for next |
 //! | `intents` | what operators want |
 //! | `restore` | how a new life begins |
 
+mod answer;
 mod contact;
 mod download;
 mod gate;
@@ -30,6 +34,8 @@ mod satellite;
 mod sealing;
 mod uplink;
 mod view;
+mod wanted;
+mod witness;
 
 use std::collections::VecDeque;
 

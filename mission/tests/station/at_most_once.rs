@@ -4,7 +4,8 @@ use mission::record::DownloadState;
 use mission::{Gate, Intent, MaybeRadiated, Refusal, Stage};
 use protocol::{Resolution, Telecommand};
 
-use crate::world::{S, World, chunk_frame, frame, heartbeat_frame, info_frame};
+use crate::frames::{chunk_frame, frame, heartbeat_frame, info_frame};
+use crate::world::{S, World};
 
 const CAPTURE: Telecommand =
     Telecommand::CaptureImage { resolution: Resolution::Cif, grey: false, strong_compression: false };

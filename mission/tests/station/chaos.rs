@@ -9,7 +9,8 @@ use mission::{
 use proptest::prelude::*;
 use protocol::{Counter, Telecommand};
 
-use crate::world::{S, Setup, World, chunk_frame, counter_of, frame, heartbeat_frame, info_frame};
+use crate::frames::{chunk_frame, frame, heartbeat_frame, info_frame};
+use crate::world::{S, Setup, World, counter_of};
 
 #[derive(Debug, Clone)]
 enum Act {

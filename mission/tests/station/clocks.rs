@@ -3,7 +3,8 @@
 use mission::Stage;
 use protocol::Telecommand;
 
-use crate::world::{S, World, frame};
+use crate::frames::frame;
+use crate::world::{S, World};
 
 const YEAR: i64 = 365 * 24 * 3_600_000_000;
 
@@ -71,7 +72,7 @@ fn after_a_restart_with_a_clock_that_went_back_nothing_waits_for_years() {
 #[test]
 fn unknown_outcomes_do_not_pile_up_when_the_clock_goes_back() {
     let mut world = World::in_contact();
-    let image = crate::world::info_frame(0, true, 2_000, 2_000 * 222, 408);
+    let image = crate::frames::info_frame(0, true, 2_000, 2_000 * 222, 408);
     world.hear(&image);
     world.download();
     for turn in 0..600 {
@@ -81,14 +82,14 @@ fn unknown_outcomes_do_not_pile_up_when_the_clock_goes_back() {
             world.radiate();
             if world.last_request().1 == Telecommand::GetImageInfo {
                 let (tag, _) = world.last_request();
-                world.hear(&crate::world::info_frame(tag, true, 2_000, 2_000 * 222, 408));
+                world.hear(&crate::frames::info_frame(tag, true, 2_000, 2_000 * 222, 408));
             }
         }
         world.step_utc(if turn % 2 == 0 { -9 * S as i64 } else { 0 });
     }
     // A cancel of a command that is forgotten is told apart from one that is known.
     let known = (1..600).filter(|id| {
-        !matches!(world.cancel_of(mission::CommandId(*id)), Err(mission::Refusal::UnknownCommand(_)))
+        !matches!(world.cancel(mission::CommandId(*id)), Err(mission::Refusal::UnknownCommand(_)))
     });
     assert!(known.count() < 300);
 }

@@ -4,7 +4,8 @@ use mission::{Gate, Input, Intent, LinkState, MaybeRadiated, Refusal, Stage};
 use protocol::{Resolution, Telecommand};
 use radio::airtime::LinkTiming;
 
-use crate::world::{S, Setup, World, chunk_frame, frame, info_frame};
+use crate::frames::{chunk_frame, frame, info_frame};
+use crate::world::{S, Setup, World};
 
 fn blind(world: &mut World, telecommand: Telecommand) -> mission::CommandId {
     let intent = mission::CommandIntent { gate: Gate::Blind, ..world.intent_of(telecommand) };

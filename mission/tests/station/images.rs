@@ -4,7 +4,8 @@ use mission::record::DownloadState;
 use mission::{Input, MaybeRadiated, ReservedFrame, Source, Stage, UtcUs};
 use protocol::{Resolution, Telecommand};
 
-use crate::world::{S, World, chunk_frame, frame, info_frame};
+use crate::frames::{chunk_frame, frame, info_frame};
+use crate::world::{S, World};
 
 const CAPTURE: Telecommand =
     Telecommand::CaptureImage { resolution: Resolution::Cif, grey: false, strong_compression: false };
@@ -250,10 +251,10 @@ fn a_replayed_file_moves_no_limit_and_opens_no_contact() {
     };
     let setup = crate::world::Setup { limits: vec![rule], ..Default::default() };
     let mut world = World::new(setup);
-    world.hear_from_file(&crate::world::heartbeat_frame(0, 1, 1));
+    world.hear_from_file(&crate::frames::heartbeat_frame(0, 1, 1));
     assert!(world.events(mission::record::EventKind::Limit).is_empty());
     assert!(!world.station.status(world.now).satellites[0].in_contact);
-    world.hear(&crate::world::heartbeat_frame(0, 1, 2));
+    world.hear(&crate::frames::heartbeat_frame(0, 1, 2));
     assert_eq!(world.events(mission::record::EventKind::Limit).len(), 1);
 }
 

@@ -170,7 +170,7 @@ fn a_sequence_counts_by_one() {
         world.command(Telecommand::Ping);
         assert_eq!(counter_of(world.last_tx()), n);
         world.radiate();
-        world.hear(&crate::world::frame(0, world.last_request().0, &[]));
+        world.hear(&crate::frames::frame(0, world.last_request().0, &[]));
         world.pass(S / 10);
     }
 }

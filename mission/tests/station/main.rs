@@ -10,10 +10,12 @@
 mod at_most_once;
 mod chaos;
 mod clocks;
+mod frames;
 mod gates;
 mod images;
 mod locks;
 mod order;
 mod restarts;
 mod storage;
+mod stored;
 mod world;

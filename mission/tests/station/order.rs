@@ -3,7 +3,8 @@
 use mission::{Effect, Input, LinkState, Stage};
 use protocol::Telecommand;
 
-use crate::world::{S, Seen, World, frame};
+use crate::frames::frame;
+use crate::world::{S, Seen, World};
 
 #[test]
 fn commit_then_witness_then_the_mark_then_the_radio() {

@@ -4,7 +4,8 @@ use mission::snapshot::Witness;
 use mission::{Effect, Intent, MaybeRadiated, Stage};
 use protocol::{Counter, Telecommand};
 
-use crate::world::{S, Setup, World, counter_of, frame};
+use crate::frames::frame;
+use crate::world::{S, Setup, World, counter_of};
 
 /// A station that dies after so many confirmations of what a Reset or Ping needs.
 fn dies_after(steps: usize, telecommand: Telecommand) -> World {

@@ -3,7 +3,8 @@
 use mission::{Effect, Input, Intent, Record, Refusal, Stage};
 use protocol::Telecommand;
 
-use crate::world::{S, World, chunk_frame, info_frame};
+use crate::frames::{chunk_frame, info_frame};
+use crate::world::{S, World};
 
 /// A world whose storage has just failed, with a batch out.
 fn failing() -> World {

@@ -1,20 +1,19 @@
 //! A world for one station, moved by hand.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
-use mission::record::{CommandRecord, DownloadRecord, DownloadState, EventKind, ImageRecord, StageRecord};
-use mission::snapshot::{
-    CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot, Witness,
-};
+use mission::record::{DownloadState, EventKind, ImageRecord, StageRecord};
+use mission::snapshot::Witness;
 use mission::{
     Accepted, BatchId, CommandId, CommandIntent, CounterRule, DownloadId, Effect, Entropy, Gate, Input,
     Intent, IntentEnvelope, IntentId, LinkConfig, LinkId, LinkState, MaybeRadiated, MonoUs, Now, Principal,
     Profile, Record, Refusal, ReservedFrame, SatelliteConfig, SatelliteId, Snapshot, Source, Stage, Station,
     StationConfig, StationId, Transmit, TxId, UtcUs,
 };
-use protocol::{Counter, Key, KeyId, RequestTag, SealedUplink, Telecommand, crc32};
+use protocol::{Key, KeyId, RequestTag, SealedUplink, Telecommand};
 use radio::airtime::LinkTiming;
+
+use crate::frames::{frame, heartbeat_frame};
 
 pub(crate) const S: u64 = 1_000_000;
 /// 2026-10-01, as microseconds since 1970.
@@ -37,39 +36,6 @@ impl Entropy for Counting {
             *byte = self.0;
         }
     }
-}
-
-/// A frame as it comes out of the air.
-pub(crate) fn frame(packet_type: u8, tag: u8, payload: &[u8]) -> Vec<u8> {
-    let mut contents = vec![packet_type, tag];
-    contents.extend(u16::try_from(payload.len()).unwrap().to_be_bytes());
-    contents.extend(payload);
-    let mut bytes = b"PIXELSAT".to_vec();
-    bytes.extend(crc32(&contents).to_be_bytes());
-    bytes.extend(contents);
-    bytes
-}
-
-pub(crate) fn heartbeat_frame(tag: u8, uptime_ms: u32, timestamp_ms: u64) -> Vec<u8> {
-    let mut payload = vec![0; 117];
-    payload[104..108].copy_from_slice(&uptime_ms.to_be_bytes());
-    payload[108..116].copy_from_slice(&timestamp_ms.to_be_bytes());
-    frame(6, tag, &payload)
-}
-
-pub(crate) fn info_frame(tag: u8, exists: bool, chunks: u32, size: u32, width: u16) -> Vec<u8> {
-    let mut payload = vec![u8::from(exists)];
-    payload.extend(chunks.to_be_bytes());
-    payload.extend(size.to_be_bytes());
-    payload.extend(width.to_be_bytes());
-    payload.extend(304u16.to_be_bytes());
-    frame(2, tag, &payload)
-}
-
-pub(crate) fn chunk_frame(tag: u8, index: u16, fill: u8) -> Vec<u8> {
-    let mut payload = index.to_be_bytes().to_vec();
-    payload.extend([fill; 222]);
-    frame(3, tag, &payload)
 }
 
 /// How the world is made.
@@ -488,90 +454,6 @@ impl World {
     pub(crate) fn locked(&self) -> Option<String> {
         self.station.status(self.now).sealing[0].locked.clone()
     }
-
-    /// As storage would read it back.
-    pub(crate) fn snapshot(&self) -> Snapshot {
-        let mut ids = LastIds::default();
-        let mut commands: Vec<(CommandRecord, CommandSnapshot)> = Vec::new();
-        let mut last_tag = None;
-        let mut counter: Option<Counter> = None;
-        let mut image: Option<ImageSnapshot> = None;
-        let mut downloads: Vec<DownloadRecord> = Vec::new();
-        for record in &self.stored {
-            match record {
-                Record::Frame(row) => ids.frame = ids.frame.max(row.id.0),
-                Record::Command(row) => {
-                    ids.command = row.id.0;
-                    commands.push((row.clone(), fresh(row)));
-                }
-                Record::Stage(row) => {
-                    let (_, command) = commands.iter_mut().find(|(c, _)| c.id == row.command).unwrap();
-                    (command.stage, command.stage_at, command.attempt) = (row.stage, row.at, row.attempt);
-                    if matches!(row.stage, Stage::Radiating | Stage::Radiated) {
-                        command.on_air_at = Some(row.at);
-                    }
-                }
-                Record::Sealed(row) => {
-                    let (_, command) = commands.iter_mut().find(|(c, _)| c.id == row.command).unwrap();
-                    let bytes = Arc::new(*row.bytes);
-                    command.sealed =
-                        Some(SealedSnapshot { key: row.key, counter: row.counter, tag: row.tag, bytes });
-                    (last_tag, counter) = (Some(row.tag), counter.max(Some(row.counter)));
-                }
-                Record::CounterFloor(row) => counter = counter.max(Some(row.counter)),
-                Record::Image(row) => {
-                    ids.image = ids.image.max(row.id.0);
-                    match &mut image {
-                        Some(held) if held.record.id == row.id => held.record = row.clone(),
-                        _ => {
-                            let record = row.clone();
-                            image = Some(ImageSnapshot { record, chunks: Vec::new(), conflicts: Vec::new() });
-                        }
-                    }
-                }
-                Record::Chunk(row) => {
-                    let image = image.as_mut().filter(|held| held.record.id == row.image).unwrap();
-                    if row.conflict {
-                        image.conflicts.push(row.index);
-                    } else {
-                        image.chunks.push((row.index, row.data.clone()));
-                    }
-                }
-                Record::Download(row) => {
-                    ids.download = ids.download.max(row.id.0);
-                    downloads.retain(|found| found.id != row.id);
-                    downloads.push(row.clone());
-                }
-                _ => {}
-            }
-        }
-        downloads.retain(|found| found.state == DownloadState::Active);
-        let open = |c: &CommandSnapshot| !c.stage.is_final() || c.stage == Stage::Unknown;
-        Snapshot {
-            last_ids: ids,
-            satellites: vec![SatelliteSnapshot {
-                satellite: self.satellite.clone(),
-                last_tag,
-                commands: commands.into_iter().map(|(_, c)| c).filter(open).collect(),
-                image,
-                downloads,
-                limits: Vec::new(),
-                heartbeat: None,
-            }],
-            keys: vec![KeySnapshot { key: self.key(), counter, witness: self.witness.clone() }],
-        }
-    }
-}
-
-fn fresh(row: &CommandRecord) -> CommandSnapshot {
-    CommandSnapshot {
-        record: row.clone(),
-        stage: Stage::Queued,
-        stage_at: row.created_at,
-        attempt: 0,
-        on_air_at: None,
-        sealed: None,
-    }
 }
 
 fn kind(record: &Record) -> String {
@@ -597,11 +479,4 @@ pub(crate) fn opened(key: &Key, transmit: &Transmit) -> (u8, Telecommand) {
 
 pub(crate) fn sequence_profile() -> Profile {
     Profile { counter: CounterRule::Sequence, rssi: false, ..Profile::default() }
-}
-
-impl World {
-    /// Tries to cancel, to see whether the engine still knows the command.
-    pub(crate) fn cancel_of(&mut self, command: CommandId) -> Result<Accepted, Refusal> {
-        self.cancel(command)
-    }
 }

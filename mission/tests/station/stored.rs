@@ -1,0 +1,98 @@
+//! What storage would read back.
+
+use std::sync::Arc;
+
+use mission::record::{CommandRecord, DownloadRecord, DownloadState};
+use mission::snapshot::{
+    CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot,
+};
+use mission::{Record, Snapshot, Stage};
+use protocol::Counter;
+
+use crate::world::World;
+
+impl World {
+    /// As storage would read it back.
+    pub(crate) fn snapshot(&self) -> Snapshot {
+        let mut ids = LastIds::default();
+        let mut commands: Vec<(CommandRecord, CommandSnapshot)> = Vec::new();
+        let mut last_tag = None;
+        let mut counter: Option<Counter> = None;
+        let mut image: Option<ImageSnapshot> = None;
+        let mut downloads: Vec<DownloadRecord> = Vec::new();
+        for record in &self.stored {
+            match record {
+                Record::Frame(row) => ids.frame = ids.frame.max(row.id.0),
+                Record::Command(row) => {
+                    ids.command = row.id.0;
+                    commands.push((row.clone(), fresh(row)));
+                }
+                Record::Stage(row) => {
+                    let (_, command) = commands.iter_mut().find(|(c, _)| c.id == row.command).unwrap();
+                    (command.stage, command.stage_at, command.attempt) = (row.stage, row.at, row.attempt);
+                    if matches!(row.stage, Stage::Radiating | Stage::Radiated) {
+                        command.on_air_at = Some(row.at);
+                    }
+                }
+                Record::Sealed(row) => {
+                    let (_, command) = commands.iter_mut().find(|(c, _)| c.id == row.command).unwrap();
+                    let bytes = Arc::new(*row.bytes);
+                    command.sealed =
+                        Some(SealedSnapshot { key: row.key, counter: row.counter, tag: row.tag, bytes });
+                    (last_tag, counter) = (Some(row.tag), counter.max(Some(row.counter)));
+                }
+                Record::CounterFloor(row) => counter = counter.max(Some(row.counter)),
+                Record::Image(row) => {
+                    ids.image = ids.image.max(row.id.0);
+                    match &mut image {
+                        Some(held) if held.record.id == row.id => held.record = row.clone(),
+                        _ => {
+                            let record = row.clone();
+                            image = Some(ImageSnapshot { record, chunks: Vec::new(), conflicts: Vec::new() });
+                        }
+                    }
+                }
+                Record::Chunk(row) => {
+                    let image = image.as_mut().filter(|held| held.record.id == row.image).unwrap();
+                    if row.conflict {
+                        image.conflicts.push(row.index);
+                    } else {
+                        image.chunks.push((row.index, row.data.clone()));
+                    }
+                }
+                Record::Download(row) => {
+                    ids.download = ids.download.max(row.id.0);
+                    downloads.retain(|found| found.id != row.id);
+                    downloads.push(row.clone());
+                }
+                _ => {}
+            }
+        }
+        downloads.retain(|found| found.state == DownloadState::Active);
+        let open = |c: &CommandSnapshot| !c.stage.is_final() || c.stage == Stage::Unknown;
+        Snapshot {
+            last_ids: ids,
+            satellites: vec![SatelliteSnapshot {
+                satellite: self.satellite.clone(),
+                last_tag,
+                commands: commands.into_iter().map(|(_, c)| c).filter(open).collect(),
+                image,
+                downloads,
+                limits: Vec::new(),
+                heartbeat: None,
+            }],
+            keys: vec![KeySnapshot { key: self.key(), counter, witness: self.witness.clone() }],
+        }
+    }
+}
+
+fn fresh(row: &CommandRecord) -> CommandSnapshot {
+    CommandSnapshot {
+        record: row.clone(),
+        stage: Stage::Queued,
+        stage_at: row.created_at,
+        attempt: 0,
+        on_air_at: None,
+        sealed: None,
+    }
+}
