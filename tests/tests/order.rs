@@ -16,7 +16,9 @@ const WRITE: [&str; 2] = ["write", "pwrite64"];
 #[test]
 fn database_then_witness_are_on_the_disk_before_the_port_is_written() {
     if let Err(why) = strace_works() {
-        eprintln!("\n*** SKIPPED: strace cannot watch a process here ({why}). The order of writes was NOT checked. ***\n");
+        eprintln!(
+            "\n*** SKIPPED: strace cannot watch a process here ({why}). The order of writes was NOT checked. ***\n"
+        );
         return;
     }
     let mut folder = Folder::new();
@@ -27,7 +29,10 @@ fn database_then_witness_are_on_the_disk_before_the_port_is_written() {
     let mut command = Command::new("strace");
     // -D: the server is our child, and strace goes when it goes. Whole pages are shown, to find what lies in them.
     command.args(["-D", "-f", "-tt", "-y", "-s", "5000", "-e"]);
-    command.arg("trace=openat,write,pwrite64,fsync,fdatasync,rename,renameat,renameat2").arg("-o").arg(&trace);
+    command
+        .arg("trace=openat,write,pwrite64,fsync,fdatasync,rename,renameat,renameat2")
+        .arg("-o")
+        .arg(&trace);
     command.arg(binary::gs_server()).args(["serve", "--config"]).arg(folder.write_config());
     let mut server = Server::start_by(&folder, command);
     let answer = server.client.post("/api/v1/commands", "ping", r#"{"command":"Ping"}"#).expect("an answer");
@@ -37,8 +42,11 @@ fn database_then_witness_are_on_the_disk_before_the_port_is_written() {
         (command.stage == "answered").then_some(())
     });
     server.process.terminate();
-    let read = || std::fs::read(&trace).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default();
-    let (text, _) = until("strace is done", PATIENCE, || Some(read()).filter(|text| text.contains("+++ exited")));
+    let read = || {
+        std::fs::read(&trace).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default()
+    };
+    let (text, _) =
+        until("strace is done", PATIENCE, || Some(read()).filter(|text| text.contains("+++ exited")));
     check(&calls(&text));
 }
 
@@ -47,7 +55,9 @@ fn check(calls: &[Call]) {
         calls.iter().find(|call| test(call)).unwrap_or_else(|| panic!("not in the trace: {what}"))
     };
     let wal = "ground.sqlite3-wal>";
-    let port = find("a telecommand written to the port", &|c| c.is(&["write"], "</dev/pts/") && c.arguments.contains("DESTINY_"));
+    let port = find("a telecommand written to the port", &|c| {
+        c.is(&["write"], "</dev/pts/") && c.arguments.contains("DESTINY_")
+    });
 
     // 1. The sealed bytes are written to the database's log, and the log is synced.
     let sealed = find("sealed bytes in the log", &|c| c.is(&WRITE, wal) && c.arguments.contains("DESTINY_"));
@@ -55,10 +65,13 @@ fn check(calls: &[Call]) {
 
     // 2. The witness: a new file, synced, renamed, its folder synced.
     let is_new = |call: &Call| call.arguments.contains("/witness/") && call.arguments.contains(".new");
-    let opened = find("a new witness", &|c| c.name == "openat" && is_new(c) && c.arguments.contains("O_CREAT"));
+    let opened =
+        find("a new witness", &|c| c.name == "openat" && is_new(c) && c.arguments.contains("O_CREAT"));
     let written = find("its line", &|c| c.name == "write" && is_new(c) && c.began > opened.ended);
-    let synced = find("its sync", &|c| SYNC.contains(&c.name.as_str()) && is_new(c) && c.began > written.ended);
-    let renamed = find("its rename", &|c| RENAME.contains(&c.name.as_str()) && is_new(c) && c.began > synced.ended);
+    let synced =
+        find("its sync", &|c| SYNC.contains(&c.name.as_str()) && is_new(c) && c.began > written.ended);
+    let renamed =
+        find("its rename", &|c| RENAME.contains(&c.name.as_str()) && is_new(c) && c.began > synced.ended);
     let folder = find("the sync of its folder", &|c| c.is(&SYNC, "/witness>") && c.began > renamed.ended);
 
     // 3. The command is marked as radiating, and the log is synced.
