@@ -6,6 +6,7 @@
 //! | [`formats`] | reading and writing elements: OMM as JSON, CSV, XML and KVN, and TLE |
 //! | [`propagator`] | SGP4 and SDP4: elements and a time to position and velocity in TEME |
 //! | [`batch`] | near-earth SGP4 for many instants or objects at once |
+//! | [`passes`] | when a satellite stands above a station's horizon |
 //! | [`time`] | UTC instants in microseconds, and UT1-UTC |
 //! | [`frames`] | sidereal time, TEME to Earth-fixed |
 //! | [`geodetic`] | the WGS84 ellipsoid |
@@ -29,6 +30,7 @@ pub mod gravity;
 pub mod ground;
 pub mod look;
 pub mod mask;
+pub mod passes;
 pub mod propagator;
 pub mod shadow;
 pub mod station;

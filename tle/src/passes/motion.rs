@@ -1,0 +1,151 @@
+//! One object's motion over the turning Earth, by seconds since the window began.
+
+use crate::batch::{NearEarth, StateColumns};
+use crate::frames::{EarthFixed, ecef_from_teme, gmst_rad};
+use crate::propagator::{PropagationError, Propagator, State};
+use crate::time::{EarthOrientation, UtcInstant};
+
+/// Seconds in a day, days in a Julian century.
+const DAY_S: f64 = 86_400.0;
+const CENTURY_DAYS: f64 = 36_525.0;
+
+/// How far the Earth has turned, by seconds since an origin: the same polynomial as [`gmst_rad`], developed about the
+/// origin, so that a search may count in seconds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct EarthTurn {
+    origin_rad: f64,
+    century: f64,
+}
+
+impl EarthTurn {
+    pub(super) fn new(origin: UtcInstant, orientation: EarthOrientation) -> Self {
+        let (days, fraction) = origin.days_since_j2000();
+        Self { origin_rad: gmst_rad(origin, orientation), century: (days + fraction) / CENTURY_DAYS }
+    }
+
+    /// Greenwich mean sidereal time, rad, any number of turns left out or in.
+    pub(super) fn gmst_rad(&self, t_s: f64) -> f64 {
+        let (t0, dt) = (self.century, t_s / (DAY_S * CENTURY_DAYS));
+        let seconds = t_s % DAY_S
+            + dt * (8_640_184.812_866 + 0.093_104 * (2.0 * t0 + dt)
+                - 6.2e-6 * (3.0 * t0 * (t0 + dt) + dt * dt));
+        self.origin_rad + seconds * (std::f64::consts::TAU / DAY_S)
+    }
+}
+
+/// True states of one object; counts how many it was asked for.
+#[derive(Debug)]
+pub(super) struct Motion<'a> {
+    propagator: &'a Propagator,
+    lanes: Option<&'a NearEarth>,
+    origin_min: f64,
+    turn: EarthTurn,
+    minutes: Vec<f64>,
+    columns: StateColumns,
+    /// States of SGP4 asked for so far.
+    pub(super) calls: u64,
+}
+
+impl<'a> Motion<'a> {
+    pub(super) fn new(
+        propagator: &'a Propagator,
+        lanes: Option<&'a NearEarth>,
+        origin: UtcInstant,
+        orientation: EarthOrientation,
+    ) -> Self {
+        Self {
+            propagator,
+            lanes,
+            origin_min: origin.minutes_since(propagator.epoch()),
+            turn: EarthTurn::new(origin, orientation),
+            minutes: Vec::new(),
+            columns: StateColumns::default(),
+            calls: 0,
+        }
+    }
+
+    /// Whether the orbit is near the Earth and nearly circular, so that lanes compute it and its velocities are good.
+    pub(super) const fn is_round(&self) -> bool {
+        self.lanes.is_some()
+    }
+
+    /// Seconds from the epoch of the elements to the origin.
+    pub(super) fn origin_since_epoch_s(&self) -> f64 {
+        self.origin_min * 60.0
+    }
+
+    /// The state in TEME.
+    pub(super) fn teme(&mut self, t_s: f64) -> Result<State, PropagationError> {
+        self.calls += 1;
+        self.propagator.at_minutes(self.origin_min + t_s / 60.0)
+    }
+
+    /// The state over the turning Earth.
+    pub(super) fn at(&mut self, t_s: f64) -> Result<EarthFixed, PropagationError> {
+        let state = self.teme(t_s)?;
+        Ok(self.turned(&state, t_s))
+    }
+
+    /// A state of TEME as seen from the turning Earth.
+    pub(super) fn turned(&self, state: &State, t_s: f64) -> EarthFixed {
+        ecef_from_teme(state, self.turn.gmst_rad(t_s))
+    }
+
+    /// Many states in TEME, handed to `take` with their number. In vector lanes where the orbit allows it; a state that the
+    /// lanes refuse is asked of the scalar path, which knows the reason.
+    pub(super) fn many_teme(
+        &mut self,
+        times_s: &[f64],
+        mut take: impl FnMut(&Self, usize, Result<State, PropagationError>),
+    ) {
+        if let Some(lanes) = self.lanes {
+            let mut minutes = std::mem::take(&mut self.minutes);
+            let mut columns = std::mem::take(&mut self.columns);
+            minutes.clear();
+            minutes.extend(times_s.iter().map(|t_s| self.origin_min + t_s / 60.0));
+            lanes.propagate(&minutes, &mut columns);
+            self.calls += times_s.len() as u64;
+            for (index, &t_s) in times_s.iter().enumerate() {
+                let state = match columns.get(index) {
+                    Some((r_teme_km, v_teme_km_s)) => Ok(State { r_teme_km, v_teme_km_s }),
+                    None => self.teme(t_s),
+                };
+                take(self, index, state);
+            }
+            self.minutes = minutes;
+            self.columns = columns;
+        } else {
+            for (index, &t_s) in times_s.iter().enumerate() {
+                let state = self.teme(t_s);
+                take(self, index, state);
+            }
+        }
+    }
+
+    /// Many states over the turning Earth; `None` where the theory has no answer.
+    pub(super) fn many(&mut self, times_s: &[f64], states: &mut Vec<Option<EarthFixed>>) {
+        states.clear();
+        self.many_teme(times_s, |motion, index, state| {
+            states.push(state.ok().map(|state| motion.turned(&state, times_s[index])));
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn earth_turns_here_as_in_frames() {
+        for origin_us in [0, 946_728_000_000_000, 1_790_000_000_123_456] {
+            let origin = UtcInstant::from_unix_us(origin_us);
+            let orientation = EarthOrientation::new(0.3).unwrap();
+            let turn = EarthTurn::new(origin, orientation);
+            for t_s in [0.0, 1.5, -80_000.0, 86_400.0, 6e5, 3.1e7, 3e8] {
+                let expected = gmst_rad(origin.plus_seconds(t_s), orientation);
+                let off = (turn.gmst_rad(t_s) - expected).sin();
+                assert!(off.abs() < 2e-11, "{origin} {t_s} {off:e}");
+            }
+        }
+    }
+}
