@@ -136,7 +136,7 @@ fn kill_again_and_again(
             server
         });
         if random.random_bool(0.5) {
-            pause(Duration::from_millis(random.random_range(0..1_200)));
+            pause(Duration::from_millis(random.random_range(0..2_000)));
         } else {
             // Shortly after a command reached a stage: between seal, witness, mark, transmission and answer.
             let before = watcher.stages.load(Ordering::Relaxed);

@@ -1,6 +1,6 @@
 //! Durable before radiated, as the operating system saw it: strace watches the first telecommand from its commit to
 //! the write to the port.
-#![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot be set up has failed, loudly")]
+#![expect(clippy::panic, reason = "a test that cannot be set up has failed, loudly")]
 
 use std::process::{Command, Stdio};
 
