@@ -1,1 +1,244 @@
-//! A known key occurs nowhere outside its own file.
+//! A known key occurs nowhere outside its own file: not in the archive, its log, the reserve, the witness or the twin's
+//! journal, not in logs at trace level, not in an answer of the API, a message of the stream or the page.
+#![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot be set up has failed, loudly")]
+
+use std::path::{Path, PathBuf};
+
+use api::{CommandView, DownloadView, Page};
+use end_to_end::folder::{KEY, key_hex};
+use end_to_end::process::{gs_server, run};
+use end_to_end::stream::{Follower, Look};
+use end_to_end::wait::{PATIENCE, until};
+use end_to_end::{Client, Folder, Server, Twin};
+
+/// So many bytes of the key in a row are no accident.
+const IN_A_ROW: usize = 5;
+
+/// Every way in which somebody might write a piece of the key down by accident.
+fn spellings() -> Vec<(String, Vec<u8>)> {
+    let mut all = Vec::new();
+    for (at, piece) in KEY.windows(IN_A_ROW).enumerate() {
+        let join =
+            |each: &dyn Fn(&u8) -> String, by: &str| piece.iter().map(each).collect::<Vec<_>>().join(by);
+        let words = [
+            ("hex", join(&|byte| format!("{byte:02x}"), "")),
+            ("hex in pairs", join(&|byte| format!("{byte:02x}"), " ")),
+            ("hex with colons", join(&|byte| format!("{byte:02x}"), ":")),
+            ("hex numbers", join(&|byte| format!("0x{byte:02x}"), ", ")),
+            ("Debug of hex", join(&|byte| format!("{byte:x}"), ", ")),
+            ("Debug, JSON", join(&|byte| format!("{byte}"), ", ")),
+            ("compact JSON", join(&|byte| format!("{byte}"), ",")),
+            ("Debug in lines", join(&|byte| format!("{byte}"), ",\n    ")),
+        ];
+        all.push((format!("raw, from byte {at}"), piece.to_vec()));
+        all.push((format!("raw, backwards, from byte {at}"), piece.iter().rev().copied().collect()));
+        for (name, text) in words {
+            all.push((format!("{name}, from byte {at}"), text.into_bytes()));
+        }
+    }
+    // Base64, at each place in a group of three bytes where a key may begin.
+    for text in ["wP/uXsLn", "wP_uXsLn", "/+5ewucT", "_-5ewucT", "7l7C5xM3"] {
+        all.push(("base64".to_owned(), text.into()));
+    }
+    all
+}
+
+/// Where the key stands in these bytes; hexadecimal in either case.
+fn find(bytes: &[u8], spellings: &[(String, Vec<u8>)]) -> Option<String> {
+    let (exact, any_case): (Vec<_>, Vec<_>) =
+        spellings.iter().partition(|(name, _)| name.starts_with("raw") || name == "base64");
+    search(bytes, &exact).or_else(|| search(&bytes.to_ascii_lowercase(), &any_case))
+}
+
+/// One walk over logs of many megabytes: what a spelling begins with is looked up before it is compared.
+fn search(bytes: &[u8], spellings: &[&(String, Vec<u8>)]) -> Option<String> {
+    let mut begins = vec![false; 1 << 16];
+    let place = |two: &[u8]| usize::from(two[0]) << 8 | usize::from(two[1]);
+    spellings.iter().for_each(|(_, spelling)| begins[place(spelling)] = true);
+    let mut at = 0;
+    while at + 1 < bytes.len() {
+        if begins[place(&bytes[at..])]
+            && let Some((name, spelling)) =
+                spellings.iter().find(|(_, spelling)| bytes[at..].starts_with(spelling))
+        {
+            let around = &bytes[at.saturating_sub(60)..(at + spelling.len() + 20).min(bytes.len())];
+            return Some(format!("{name}, at {at}: {}", String::from_utf8_lossy(around)));
+        }
+        at += 1;
+    }
+    None
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+        let kind = entry.file_type().expect("its kind");
+        if kind.is_dir() {
+            found.extend(files(&entry.path()));
+        } else if kind.is_file() {
+            found.push(entry.path());
+        }
+    }
+    found
+}
+
+/// Every path that is read, as the server's own table has them; numbers are those of the first row.
+fn paths(index: &str) -> Vec<String> {
+    const TABLE: &str = include_str!("../../gs-server/src/http/routes.rs");
+    let table = TABLE.split("fn table()").nth(1).expect("the table of all paths");
+    let rows = table.lines().filter_map(|line| line.trim().strip_prefix("read(\"")?.split('"').next());
+    let mut paths = Vec::new();
+    for row in rows {
+        if row.contains("{file}") {
+            let names = index
+                .split("/page/")
+                .skip(1)
+                .filter_map(|rest| rest.split(['"', '\'', '`', ' ', ')']).next());
+            paths.extend(names.map(|name| row.replace("{file}", name)));
+        } else {
+            paths.push(row.replace("{id}", "1"));
+        }
+    }
+    paths
+}
+
+#[test]
+fn the_scanner_finds_the_key_where_it_is() {
+    let spellings = spellings();
+    let found = |bytes: &[u8]| find(bytes, &spellings).is_some();
+    assert!(found(&KEY) && found(key_hex().as_bytes()) && found(key_hex().to_uppercase().as_bytes()));
+    assert!(found(format!("{KEY:?}").as_bytes()) && found(format!("{KEY:#?}").as_bytes()));
+    assert!(found(format!("{KEY:x?}").as_bytes()) && found(format!("{KEY:02X?}").as_bytes()));
+    assert!(found(b"AMD/7l7C5xM3utyrHt76ztU=") && found(b"wP/uXsLnEze63Kse3vrO1Q=="));
+    assert!(found(&[b"....".as_slice(), &KEY[7..13], b"...."].concat()));
+    assert!(!found(&[0; 64]) && !found(b"0123456789abcdef"));
+}
+
+#[test]
+fn a_key_that_cannot_be_used_is_not_quoted() {
+    let folder = Folder::new();
+    let spellings = spellings();
+    let config = folder.write_config();
+    let hex = key_hex();
+    let raw: String = KEY.iter().map(|byte| char::from(*byte)).collect();
+    for (text, mode) in [
+        (hex.clone(), 0o644),
+        (hex[..30].to_owned(), 0o600),
+        (format!("{hex}00"), 0o600),
+        (format!("{hex}\n{hex}\n"), 0o600),
+        (format!("x{hex}"), 0o600),
+        (format!("key = \"{hex}\"\n"), 0o600),
+        (raw, 0o600),
+        (hex.clone(), 0o600),
+    ] {
+        folder.write_key("twin.key", &text, mode);
+        for verb in [&["serve", "--log", "trace", "--config"][..], &["config", "check"]] {
+            let mut command = gs_server(verb);
+            command.arg(&config);
+            let (code, out, error) = run(command);
+            assert_ne!(code, 0, "{out}");
+            assert_eq!(find(format!("{out}{error}").as_bytes(), &spellings), None, "{verb:?}");
+        }
+    }
+}
+
+#[test]
+fn the_key_stays_in_its_file() {
+    let mut folder = Folder::new();
+    folder.speed = Some(20.0);
+    folder.heartbeat_s = 10;
+    folder.log = "trace".to_owned();
+    let spellings = spellings();
+    let twin = Twin::start(&folder, &["--log", "trace"]);
+    let mut server = Server::start(&folder);
+    let client = server.client.clone();
+    let mut stream = Follower::open(&client, 0).expect("a stream");
+    for (path, key, body) in [
+        ("/api/v1/commands", "ping", r#"{"command":"Ping"}"#),
+        ("/api/v1/commands", "quaternion", r#"{"command":"GetAdcsInfo"}"#),
+        ("/api/v1/downloads", "image", "{}"),
+    ] {
+        let answer = client.post(path, key, body).expect("an answer");
+        assert_eq!(answer.status, 201, "{}", answer.text());
+    }
+    let path = format!("/api/v1/keys/{}/confirm-counter", folder.key().id());
+    let answers = [
+        client.post(&path, "confirm", "{}").expect("an answer"),
+        client.post("/api/v1/keys/0000/confirm-counter", "other", "{}").expect("an answer"),
+        client.post("/api/v1/clock/vouch", "vouch", "{}").expect("an answer"),
+    ];
+    until("commands are answered and an image is home", 2 * PATIENCE, || {
+        if let Look::Message(message) = stream.look() {
+            let text = serde_json::to_vec(&*message).expect("JSON");
+            assert_eq!(find(&text, &spellings), None, "in the stream");
+        }
+        let commands: Page<CommandView> = client.read("/api/v1/commands?limit=1000");
+        let downloads: Page<DownloadView> = client.read("/api/v1/downloads");
+        let answered = commands.items.iter().filter(|command| command.stage == "answered").count();
+        (answered >= 3 && downloads.items.iter().any(|download| download.state == "complete")).then_some(())
+    });
+    for answer in answers {
+        assert_eq!(find(&answer.body, &spellings), None, "in an answer");
+    }
+    walk(&client, &spellings);
+
+    // While it runs, with its write-ahead log; after `kill -9`; after an orderly end.
+    let alive = scan(&folder, &spellings);
+    let names: Vec<&str> = alive.iter().filter_map(|path| path.file_name()?.to_str()).collect();
+    for wanted in [
+        "ground.sqlite3",
+        "ground.sqlite3-wal",
+        "reserve.bin",
+        "serve.log",
+        "twin.log",
+        "twin.journal",
+        "token",
+    ] {
+        assert!(names.contains(&wanted), "{wanted} is not among {names:?}");
+    }
+    assert!(names.iter().any(|name| *name == folder.key().id().to_string()), "no witness among {names:?}");
+    let pid = server.process.pid();
+    for of_process in ["cmdline", "environ"] {
+        let bytes = std::fs::read(format!("/proc/{pid}/{of_process}")).expect("procfs");
+        assert_eq!(find(&bytes, &spellings), None, "{of_process}");
+    }
+    assert!(server.process.log().contains("TRACE"), "the log is not at trace level");
+    server.process.kill9();
+    scan(&folder, &spellings);
+    Server::start(&folder).stop();
+    scan(&folder, &spellings);
+    drop(twin);
+}
+
+/// Every answer to a question, the page and all that it loads.
+fn walk(client: &Client, spellings: &[(String, Vec<u8>)]) {
+    let index = client.get("/").expect("the page").text();
+    let paths = paths(&index);
+    assert!(paths.len() > 20, "{paths:?}");
+    for path in paths {
+        let lists = ["frames", "commands", "downloads", "images", "events"];
+        let whole = lists.iter().any(|list| path == format!("/api/v1/{list}"));
+        let asked = if whole { format!("{path}?limit=1000") } else { path };
+        let answer = client.get(&asked).unwrap_or_else(|error| panic!("{asked}: {error}"));
+        let needs_parameters = asked.ends_with("/telemetry");
+        assert!(answer.status < 400 || needs_parameters, "{asked}: {} {}", answer.status, answer.text());
+        let headers = format!("{:?}", answer.headers);
+        assert_eq!(
+            find(&answer.body, spellings).or_else(|| find(headers.as_bytes(), spellings)),
+            None,
+            "{asked}"
+        );
+    }
+}
+
+/// Looks through every file of the folder but the key's own.
+fn scan(folder: &Folder, spellings: &[(String, Vec<u8>)]) -> Vec<PathBuf> {
+    let own = folder.file("twin.key");
+    assert!(find(&std::fs::read(&own).expect("the key file"), spellings).is_some());
+    let all: Vec<PathBuf> = files(folder.path()).into_iter().filter(|path| *path != own).collect();
+    for path in &all {
+        let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert_eq!(find(&bytes, spellings), None, "{}", path.display());
+    }
+    all
+}

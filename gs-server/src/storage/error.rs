@@ -47,7 +47,10 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// There is no room.
-    #[error("the disk is full, or the database has reached its size limit: make room; it goes on by itself")]
+    #[error(
+        "the disk is full, or the database has reached its size limit: make room, and it goes on by itself; or raise \
+         storage.max_page_count and start again"
+    )]
     Full,
     /// The device failed.
     #[error("reading or writing {what} failed: look at the disk and its cable")]
