@@ -12,6 +12,9 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 NEXTEST_VERSION=0.9.151
 DENY_VERSION=0.20.2
 CRYPTOGRAPHY_VERSION=46
+SGP4_VERSION=2.27
+SKYFIELD_VERSION=1.55
+ERFA_VERSION=2.0
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
@@ -51,14 +54,15 @@ int main(void) { return 0; }'
   printf '%s\n' "$c_program" | cc -x c - -o /dev/null 2>/dev/null || install_packages build-essential # gcc, libc6-dev
 }
 
-# scripts/vectors.py makes the test vectors with another language's libraries, in .venv.
+# scripts/vectors.py and scripts/orbit_vectors.py make the test vectors with other people's libraries, in .venv.
 python() {
+  local packages=("cryptography>=$CRYPTOGRAPHY_VERSION" "sgp4>=$SGP4_VERSION" "skyfield>=$SKYFIELD_VERSION" "pyerfa>=$ERFA_VERSION")
   python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages python3 python3-venv
-  if ! .venv/bin/python -c 'import cryptography' 2>/dev/null; then
-    say "making .venv with cryptography"
+  if ! .venv/bin/python -c 'import cryptography, sgp4, skyfield, erfa' 2>/dev/null; then
+    say "making .venv with ${packages[*]}"
     python3 -m venv --clear .venv || fail "python3 could not make .venv"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check "cryptography>=$CRYPTOGRAPHY_VERSION" \
-      || fail "pip could not install the Python package cryptography into .venv"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check "${packages[@]}" \
+      || fail "pip could not install ${packages[*]} into .venv"
   fi
 }
 

@@ -66,10 +66,14 @@ impl Propagator {
         .map_err(|_| ElementsError::MeanMotion { found_rev_day: elements.mean_motion_rev_day })?;
         let period_min = std::f64::consts::TAU / orbit.mean_motion;
         let (days, fraction) = elements.epoch.days_since_j2000();
+        // One f64 of a Julian date, as the AFSPC's code has it: it rounds the epoch to 40 us for the places of Sun and
+        // Moon (not for the time since epoch), and without it far orbits differ from the reference by millimetres.
+        let j2000 = 2_451_545.0;
+        let afspc_days = (j2000 + days + fraction) - j2000;
         let constants = sgp4::Constants::new(
             sgp4::WGS72,
             sgp4::afspc_epoch_to_sidereal_time,
-            (days + fraction) / 365.25,
+            afspc_days / 365.25,
             elements.bstar,
             orbit,
         )
