@@ -421,7 +421,7 @@ fn a_start_under_a_limit_too_small_for_a_database_says_so() {
     command.arg(binary::gs_server()).arg(folder.write_config()).stdin(Stdio::null());
     let (code, out, error) = run(command);
     assert_eq!((code, out.as_str()), (1, ""), "{error}");
-    says(&error, &["the archive cannot be opened"]);
+    says(&error, &["the archive cannot be opened", "ulimit -f"]);
     // What it left behind does not stand in the way.
     Server::start(&folder).stop();
 }

@@ -53,7 +53,9 @@ pub enum StoreError {
     )]
     Full,
     /// The device failed.
-    #[error("reading or writing {what} failed: look at the disk and its cable")]
+    #[error(
+        "reading or writing {what} failed: look at the disk, its cable and the limit of the shell (ulimit -f)"
+    )]
     Io {
         /// What was read or written.
         what: String,
