@@ -10,6 +10,7 @@ use tokio_util::sync::CancellationToken;
 use super::background::{Background, Outcome, ReserveWork};
 use super::handle::{EngineHandle, INTENTS, Request};
 use super::intents::Intents;
+use super::log;
 use super::message::{EngineInbox, EngineMessage, INBOX, LinkCommand, LinkPort};
 use super::watch::StatusView;
 use crate::clock::{BusyToken, Timer, kernel_says_synchronised};
@@ -198,6 +199,7 @@ impl Engine {
         match outcome {
             Outcome::Persisted { batch, result: Ok(events) } => {
                 for event in events {
+                    log::event(&event);
                     self.hub.publish(event);
                 }
                 self.handle(Input::PersistDone(batch));

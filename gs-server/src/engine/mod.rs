@@ -1,7 +1,7 @@
 //! The engine's actor: it owns the [`mission::Station`], feeds it and carries out what it asks.
 //!
 //! ```text
-//! links ──┐                       ┌─▶ storage (one batch at a time) ─▶ hub
+//! links ──┐                       ┌─▶ storage (one batch at a time) ─▶ hub, log
 //! HTTP  ──┼─▶ inbox ─▶ Station ─▶ ┼─▶ witness and reserve (files)
 //! clock ──┘                       ├─▶ links (transmit)
 //!                                 └─▶ whoever asked
@@ -17,6 +17,7 @@ mod background;
 mod entropy;
 mod handle;
 mod intents;
+mod log;
 mod message;
 mod watch;
 
