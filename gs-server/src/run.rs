@@ -15,7 +15,7 @@ use std::time::Duration;
 use futures_util::FutureExt as _;
 use futures_util::future::BoxFuture;
 use mission::{Clock as _, Entropy, Intent, LinkId, Principal, Snapshot, StationConfig, UtcUs};
-use protocol::Key;
+use protocol::{Key, KeyId};
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
@@ -128,6 +128,16 @@ pub enum RunError {
         file: String,
         /// What the key is.
         simulated: bool,
+    },
+    /// Two satellites with one key: what one is told the other would obey, and both would count its nonces.
+    #[error("satellites {first} and {second} have the same key {key}: give each a key of its own")]
+    KeyShared {
+        /// Whose key it is.
+        first: String,
+        /// Who has it, too.
+        second: String,
+        /// The key.
+        key: KeyId,
     },
     /// A simulated clock with real links, or the other way round.
     #[error("the clock is simulated and the links are real: real links refuse it")]
@@ -309,14 +319,19 @@ fn no_core_dumps() {
     }
 }
 
-/// The key of each satellite that has one. Simulated keys go with simulated links only, real ones with real links.
-fn load_keys(config: &Config) -> Result<BTreeMap<String, Key>, RunError> {
+/// The key of each satellite that has one. Simulated keys go with simulated links only, real ones with real links, and
+/// no two satellites share one.
+pub(crate) fn load_keys(config: &Config) -> Result<BTreeMap<String, Key>, RunError> {
     let mut loaded = BTreeMap::new();
+    let mut owners = BTreeMap::new();
     for satellite in &config.satellites {
         let Some(path) = &satellite.key_file else { continue };
         let file = keys::load(path)?;
         if file.simulated != config.is_simulated() {
             return Err(RunError::KeyKind { file: path.display().to_string(), simulated: file.simulated });
+        }
+        if let Some(first) = owners.insert(file.id().to_string(), satellite.name.clone()) {
+            return Err(RunError::KeyShared { first, second: satellite.name.clone(), key: file.id() });
         }
         loaded.insert(satellite.name.clone(), file.key);
     }

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
+use super::serve::failure;
 use super::shell::{print_json, print_line};
 use super::{Exit, Failure};
+use crate::run::load_keys;
 
 /// `gs-server config`.
 #[derive(Debug, Subcommand)]
@@ -79,19 +81,7 @@ impl Check {
     fn run(self) -> Result<Exit, Failure> {
         let config = crate::config::Config::load(&self.file.path()).map_err(Failure::usage)?;
         config.check().map_err(Failure::usage)?;
-        for satellite in &config.satellites {
-            if let Some(path) = &satellite.key_file {
-                let key = crate::keys::load(path).map_err(Failure::refused)?;
-                if key.simulated != config.is_simulated() {
-                    let (is, are) = if key.simulated { ("simulated", "real") } else { ("real", "simulated") };
-                    return Err(Failure::refused(format!(
-                        "key file {} of satellite {} is {is}, the links are {are}",
-                        path.display(),
-                        satellite.name
-                    )));
-                }
-            }
-        }
+        drop(load_keys(&config).map_err(failure)?);
         let summary = config.to_string();
         if self.json {
             let summary = summary.lines().map(str::to_owned).collect();

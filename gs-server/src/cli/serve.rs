@@ -116,9 +116,11 @@ fn changed(path: &std::path::Path, listen: Option<SocketAddr>) -> Result<Config,
 pub(super) fn failure(error: RunError) -> Failure {
     match &error {
         RunError::Config(_) => Failure::usage(error),
-        RunError::Key(_) | RunError::KeyKind { .. } | RunError::ClockKind | RunError::StoreKind { .. } => {
-            Failure::refused(error)
-        }
+        RunError::Key(_)
+        | RunError::KeyKind { .. }
+        | RunError::KeyShared { .. }
+        | RunError::ClockKind
+        | RunError::StoreKind { .. } => Failure::refused(error),
         RunError::Store(store) if is_refusal(store) => Failure::refused(error),
         _ => Failure::failed(error),
     }

@@ -76,6 +76,26 @@ fn a_configuration_is_checked_with_its_keys_and_shown_without_secrets() {
 }
 
 #[test]
+fn two_satellites_do_not_share_a_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = in_folder(folder.path(), "station.toml");
+    let example = run(["config", "example"]).1;
+    let second = "[[satellites]]\nname = \"pixelsat-2\"\nkey_file = \"copy.key\"\n\n[storage]";
+    fs::write(&config, example.replacen("[storage]", second, 1)).unwrap();
+    let key = folder.path().join("pixelsat-1.key");
+    assert_eq!(run(["key", "new", &key.display().to_string()]).0, 0);
+    fs::copy(&key, folder.path().join("copy.key")).unwrap();
+    let wanted = "satellites pixelsat-1 and pixelsat-2 have the same key";
+    for verb in
+        [&["config", "check"][..], &["serve", "--log", "error", "--listen", "127.0.0.1:0", "--config"]]
+    {
+        let (code, out, error) = run(verb.iter().copied().chain([config.as_str()]));
+        assert_eq!((code, out.as_str()), (3, ""), "{verb:?}: {error}");
+        assert!(error.contains(wanted), "{verb:?}: {error}");
+    }
+}
+
+#[test]
 fn serve_refuses_before_it_begins() {
     let folder = tempfile::tempdir().unwrap();
     let config = in_folder(folder.path(), "station.toml");
