@@ -117,6 +117,8 @@ impl Scene {
             .map_err(|source| DemoError::Listen { address: options.listen, source })?;
         let mut config = Config::from_toml(CONFIG, &data)?;
         config.links.iter_mut().for_each(|link| link.port = Some(port.display().to_string()));
+        // The log shows the configuration: the address in it must be the one that answers.
+        config.http.listen = listener.local_addr().unwrap_or(options.listen);
         let token_file = config.token_file();
         let (tell_ready, is_ready) = oneshot::channel();
         let link = LinkId::new("e22").map_err(|error| crate::config::ConfigError::Value {
