@@ -9,12 +9,11 @@ pub(super) fn form(text: &str) -> Result<Form, SourceError> {
         return Err(SourceError::Empty);
     };
     let first = first.trim_start();
-    if let Some(refusal) = refusal(first) {
-        return Err(refusal);
-    }
+    let card = numbered_lines(text).find(|(_, line)| lines::tle_line(line).is_some());
     match first.as_bytes().first() {
-        Some(b'<') => return markup(text),
-        Some(b'[' | b'{') => return json(text),
+        // A name may begin like markup or JSON.
+        Some(b'<') if card.is_none() || is_page(text) => return markup(text),
+        Some(b'[' | b'{') if card.is_none() => return json(text),
         _ => {}
     }
     if first.starts_with("CCSDS_OMM_VERS") {
@@ -23,8 +22,11 @@ pub(super) fn form(text: &str) -> Result<Form, SourceError> {
     if first.contains(',') && first.contains("EPOCH") && first.contains("INCLINATION") {
         return Ok(Form::OmmCsv);
     }
-    if let Some((_, card)) = numbered_lines(text).find(|(_, line)| lines::tle_line(line).is_some()) {
+    if let Some((_, card)) = card {
         return Ok(if card.trim_start() == first { Form::TwoLine } else { Form::ThreeLine });
+    }
+    if let Some(refusal) = refusal(first) {
+        return Err(refusal);
     }
     // KVN whose first line was lost.
     let key = |line: &str, wanted: &str| {
@@ -47,6 +49,11 @@ fn refusal(first: &str) -> Option<SourceError> {
     }
     let message = ["invalid query", "error", "you must be logged in", "forbidden", "access denied", "http/"];
     message.iter().any(|word| said.starts_with(word)).then(|| SourceError::Message { said: excerpt(first) })
+}
+
+fn is_page(text: &str) -> bool {
+    let begins = excerpt(text).to_ascii_lowercase();
+    ["<!doctype", "<html", "<?xml", "<ndm", "<omm"].iter().any(|tag| begins.contains(tag))
 }
 
 fn markup(text: &str) -> Result<Form, SourceError> {
