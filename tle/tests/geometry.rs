@@ -1,5 +1,7 @@
 //! Look angles, places below, the Sun and the shadow, against Skyfield and ERFA.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on says where")]
+
 use tle::formats::{self, Checksums};
 use tle::shadow::{ShadowEdge, shadow_crossings};
 use tle::sun::sun_teme_km;

@@ -1,5 +1,7 @@
 //! OMM as the sources write it.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on says where")]
+
 use tle::formats::{self, Checksums, Form, Found, SetError};
 use tle::{Elements, Propagator};
 

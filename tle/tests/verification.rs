@@ -1,5 +1,7 @@
 //! SGP4 against the verification set of AIAA 2006-6753, and TLE against OMM.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on says where")]
+
 use tle::formats::{self, Checksums, Form};
 use tle::{Elements, Propagator, UtcInstant};
 
