@@ -252,3 +252,19 @@ fn lone_omm_and_objects_without_an_array_are_legal() {
     assert_eq!(only(object), only(TLE));
     assert_eq!(read(&format!("{object}\n{object}\n")).len(), 2);
 }
+
+#[test]
+fn endless_and_hollow_texts_take_no_endless_time() {
+    // Quadratic readers would need hours for these.
+    for text in [
+        format!("{{\"EPOCH\":1,{}\"B\":1}}", "\"A\":1,".repeat(200_000)),
+        "{\"EPOCH\"".repeat(200_000),
+        "<omm>".repeat(200_000),
+        "<omm><a>".repeat(200_000),
+        format!("CCSDS_OMM_VERS = 2.0\n{}", "COMMENT x\n".repeat(200_000)),
+        format!("EPOCH,INCLINATION\n{}", "\"\n".repeat(200_000)),
+        "1 25544U 98067A   20194.88612269\n".repeat(100_000),
+    ] {
+        assert!(read(&text).iter().all(Result::is_err));
+    }
+}

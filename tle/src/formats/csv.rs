@@ -16,8 +16,8 @@ impl std::fmt::Debug for Reader<'_> {
 
 impl<'a> Reader<'a> {
     pub(super) fn new(text: &'a str) -> Result<Self, SourceError> {
-        let mut lines =
-            numbered_lines(text).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+        let mut lines = numbered_lines(text)
+            .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
         let (_, first) = lines.next().ok_or(SourceError::Empty)?;
         let header = cells(first).ok_or_else(|| SourceError::NotElements { begins: excerpt(first) })?;
         let header = header.iter().map(|key| key.trim().to_owned()).collect();

@@ -103,7 +103,7 @@ impl Iterator for Reader<'_> {
                     .or_else(|| self.name.take().map(Self::nameless))
                     .map(Err);
             };
-            if text.trim().is_empty() || text.starts_with('#') {
+            if text.trim().is_empty() || text.trim_start().starts_with('#') {
                 continue;
             }
             let line = Numbered { number, text };

@@ -26,6 +26,9 @@ pub(super) const CONSTANT_KEYS: [(&str, &str); 5] = [
 /// Keys of the header, in their order.
 pub(super) const HEADER_KEYS: [&str; 3] = ["COMMENT", "CREATION_DATE", "ORIGINATOR"];
 
+/// Fields that a set may have: the richest message in the wild has about fifty.
+const FIELDS_MAX: usize = 1000;
+
 /// Collects the fields of a set and makes elements of them.
 #[derive(Debug, Default)]
 pub(super) struct Fields {
@@ -67,6 +70,10 @@ impl Fields {
         let line = self.line;
         let object = self.object();
         let mut at = line;
+        if self.fields.len() > FIELDS_MAX {
+            let said = format!("the set has more than {FIELDS_MAX} fields");
+            return Err(self.error(line, SetFault::Syntax { form: "OMM", said }));
+        }
         self.take_all(&mut at).map_err(|fault| SetError { line: at, object, fault })
     }
 

@@ -54,7 +54,7 @@ impl Iterator for Reader<'_> {
         let line = self.line;
         let rest = self.text.get(start..)?;
         let next = rest.get(4..).and_then(next_message).map_or(rest.len(), |next| next + 4);
-        let end = rest.find("</omm>").map_or(next, |end| (end + 6).min(next));
+        let end = rest.get(..next)?.find("</omm>").map_or(next, |end| end + 6);
         self.advance(start + end);
         let mut fields = Fields::new(line);
         match read_message(rest.get(..end)?, &mut fields) {
