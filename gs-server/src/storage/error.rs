@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// Another server works in this folder.
-    #[error("{} is in use by another server{}: stop that one, or use another --data", folder.display(), process(*.holder))]
+    #[error("{} is in use by another server{}: stop that one, or use another data folder", folder.display(), process(*.holder))]
     Locked {
         /// The data folder.
         folder: PathBuf,
@@ -33,7 +33,7 @@ pub enum StoreError {
         known: i64,
     },
     /// Something simulated and something real would meet in one folder.
-    #[error("{} was made by a {}: use another --data", folder.display(), if *.simulated { "simulation" } else { "real station" })]
+    #[error("{} was made by a {}: use another data folder", folder.display(), if *.simulated { "simulation" } else { "real station" })]
     SimulatedMark {
         /// The data folder.
         folder: PathBuf,
@@ -41,7 +41,7 @@ pub enum StoreError {
         simulated: bool,
     },
     /// The operating system does not let us.
-    #[error("no permission for {}: make this user its owner (chown), or use another --data", path.display())]
+    #[error("no permission for {}: make this user its owner (chown), or use another data folder", path.display())]
     Permission {
         /// For what.
         path: PathBuf,

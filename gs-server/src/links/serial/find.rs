@@ -63,7 +63,7 @@ pub(super) fn cannot_open(path: &str, error: &serialport::Error) -> String {
         ErrorKind::Io(std::io::ErrorKind::PermissionDenied) => {
             format!("port {path} may not be opened: add this user to the group of the device (often dialout)")
         }
-        _ => format!("port {path} cannot be opened: {error}"),
+        _ => format!("port {path} cannot be opened as a serial port: {error}"),
     }
 }
 

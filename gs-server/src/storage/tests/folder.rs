@@ -53,7 +53,7 @@ async fn a_second_server_is_refused_and_told_who_is_there() {
     let (parent, store) = fresh().await;
     let error = reopen(&parent).await.unwrap_err();
     assert!(matches!(error, StoreError::Locked { holder: Some(pid), .. } if pid == std::process::id()));
-    assert!(error.to_string().contains("use another --data"), "{error}");
+    assert!(error.to_string().contains("use another data folder"), "{error}");
     drop(store);
     reopen(&parent).await.unwrap();
 }
@@ -65,14 +65,14 @@ async fn simulated_and_real_do_not_meet() {
     let simulated = StoreOptions { simulated: true, ..options(&parent) };
     let error = Store::open(simulated).await.unwrap_err();
     assert!(matches!(error, StoreError::SimulatedMark { simulated: false, .. }));
-    assert!(error.to_string().ends_with("was made by a real station: use another --data"), "{error}");
+    assert!(error.to_string().ends_with("was made by a real station: use another data folder"), "{error}");
 
     let other = tempfile::tempdir().unwrap();
     let store = Store::open(StoreOptions { simulated: true, ..options(&other) }).await.unwrap();
     assert!(store.is_simulated());
     drop(store);
     let error = reopen(&other).await.unwrap_err();
-    assert!(error.to_string().ends_with("was made by a simulation: use another --data"), "{error}");
+    assert!(error.to_string().ends_with("was made by a simulation: use another data folder"), "{error}");
 }
 
 #[tokio::test]
