@@ -120,6 +120,9 @@ pub struct StorageView {
     pub waiting: u64,
     /// Raw frames in the reserve since storage failed.
     pub reserved: u64,
+    /// Raw frames that the reserve had no place for since storage failed: they are in memory only.
+    #[serde(default)]
+    pub unreserved: u64,
     /// Derived records dropped since the start; `gs-server redecode` makes them again.
     pub derived_dropped: u64,
     /// Raw frames that found no place since the start.

@@ -62,6 +62,11 @@ pub enum Input<'a> {
         /// Why, as a sentence.
         reason: &'a str,
     },
+    /// The reserve could not keep a raw frame that was handed to it: it is in memory only.
+    ReserveFailed {
+        /// Why, as a sentence.
+        reason: &'a str,
+    },
     /// The witness of this key stands at this counter, durably.
     WitnessDone {
         /// Which key.

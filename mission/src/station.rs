@@ -63,6 +63,8 @@ pub trait Entropy: Send {
 /// A frame that was heard a moment ago, so that the same bytes again are a second reception and not a second frame.
 struct Recent {
     id: FrameId,
+    /// Index of the satellite: equal bytes of two satellites are two frames.
+    satellite: usize,
     at: UtcUs,
     bytes: Box<[u8]>,
 }
@@ -112,6 +114,14 @@ impl Station {
                         "storage fails: {reason}. Nothing is transmitted; raw frames go to the reserve until it recovers"
                     );
                     self.event(now.utc, EventKind::Storage, Level::Critical, About::default(), message);
+                }
+            }
+            Input::ReserveFailed { reason } => {
+                if self.journal.unreserved() {
+                    let message = format!(
+                        "the reserve takes no raw frame: {reason}. What is heard now is in memory only until storage recovers"
+                    );
+                    self.event(now.utc, EventKind::Storage, Level::Severe, About::default(), message);
                 }
             }
             Input::WitnessDone { key, counter } => self.witness_done(now, key, counter),

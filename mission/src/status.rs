@@ -112,6 +112,8 @@ pub struct StorageStatus {
     pub waiting: usize,
     /// Raw frames handed to the reserve since storage failed.
     pub reserved: u64,
+    /// Raw frames that the reserve had no place for since storage failed: they are in memory only.
+    pub unreserved: u64,
     /// Derived records dropped since the start (redecode makes them again).
     pub derived_dropped: u64,
     /// Raw frames that found no place at all since the start.

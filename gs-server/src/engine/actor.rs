@@ -224,7 +224,8 @@ impl Engine {
                     self.handle(Input::Intent(envelope));
                 }
             }
-            Outcome::Reserve => {}
+            Outcome::Reserve { refused: Some(reason) } => self.handle(Input::ReserveFailed { reason: &reason }),
+            Outcome::Reserve { refused: None } => {}
             Outcome::Clock { synchronised } => self.handle(Input::Clock { synchronised }),
         }
     }
@@ -269,8 +270,14 @@ impl Engine {
                     }
                 }
                 Effect::Reply { intent, result } => self.intents.reply(intent, result),
-                Effect::Reserve(frame) => self.background.queue_reserve(ReserveWork::Push(Box::new(frame))),
-                Effect::ReserveClear => self.background.queue_reserve(ReserveWork::Clear),
+                Effect::Reserve(frame) => {
+                    if !self.background.queue_reserve(ReserveWork::Push(Box::new(frame))) {
+                        self.handle(Input::ReserveFailed { reason: "the disk is too slow" });
+                    }
+                }
+                Effect::ReserveClear => {
+                    let _ = self.background.queue_reserve(ReserveWork::Clear);
+                }
             }
         }
         let timer = Arc::clone(&self.timer);

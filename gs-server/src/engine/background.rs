@@ -15,7 +15,10 @@ pub(super) enum Outcome {
     Persisted { batch: BatchId, result: Result<Vec<StoredEvent>, StoreError> },
     Witness { key: KeyId, counter: Counter, result: Result<(), StoreError> },
     LookedUp { intent: IntentId, result: Result<Option<StoredIntent>, StoreError> },
-    Reserve,
+    /// Why a raw frame found no place in the reserve, if so.
+    Reserve {
+        refused: Option<String>,
+    },
     Clock { synchronised: bool },
 }
 
@@ -40,15 +43,17 @@ impl Background {
         self.tasks.spawn(async move { (work.await, busy) });
     }
 
-    /// Reserve work is done in its order, one after the other.
-    pub(super) fn queue_reserve(&mut self, work: ReserveWork) {
+    /// Reserve work is done in its order, one after the other. False when even the queue is full.
+    #[must_use]
+    pub(super) fn queue_reserve(&mut self, work: ReserveWork) -> bool {
         if self.reserve.len() >= RESERVE_QUEUE {
             tracing::error!(
                 "the disk takes neither records nor the reserve: a raw frame is held in memory only"
             );
-            return;
+            return false;
         }
         self.reserve.push_back(work);
+        true
     }
 
     pub(super) fn reserve_step(&mut self, store: &Store, busy: impl FnOnce() -> BusyToken) {
@@ -59,14 +64,15 @@ impl Background {
         self.reserving = true;
         let store = store.clone();
         self.start(busy(), async move {
-            let result = match work {
-                ReserveWork::Push(frame) => store.reserve_push(*frame).await,
-                ReserveWork::Clear => store.reserve_clear().await,
+            let (is_frame, result) = match work {
+                ReserveWork::Push(frame) => (true, store.reserve_push(*frame).await),
+                ReserveWork::Clear => (false, store.reserve_clear().await),
             };
-            if let Err(error) = result {
-                tracing::error!(%error, "the reserve does not take a raw frame: {error}");
+            let refused = result.err().map(|error| error.to_string());
+            if let Some(error) = &refused {
+                tracing::error!(%error, "the reserve does not do as it is told: {error}");
             }
-            Outcome::Reserve
+            Outcome::Reserve { refused: refused.filter(|_| is_frame) }
         });
     }
 
@@ -78,7 +84,7 @@ impl Background {
     pub(super) async fn next(&mut self) -> Result<(Outcome, BusyToken), JoinError> {
         match self.tasks.join_next().await {
             Some(result) => {
-                if matches!(result, Ok((Outcome::Reserve, _))) {
+                if matches!(result, Ok((Outcome::Reserve { .. }, _))) {
                     self.reserving = false;
                 }
                 result

@@ -38,6 +38,7 @@ pub(super) fn view(app: &App, status: &Status, last_sequence: i64) -> StationVie
             failing: storage.failing.clone(),
             waiting: storage.waiting as u64,
             reserved: storage.reserved,
+            unreserved: storage.unreserved,
             derived_dropped: storage.derived_dropped,
             frames_lost: storage.frames_lost,
         },

@@ -16,6 +16,9 @@ use crate::record::Gate;
 /// Without contact, listen for this long before a blind transmission.
 const LISTEN_FIRST_US: u64 = 5_000_000;
 
+/// Satellites take turns on the air of one station; whoever waits looks again after this.
+const TAKE_TURNS_US: u64 = 250_000;
+
 /// Not now.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Wait {
@@ -49,6 +52,9 @@ impl Station {
         // A station that transmits hears nothing, over whichever of its radios.
         if self.links.iter().any(|link| link.on_air.is_some()) {
             return Err(wait("something of ours is on the air", None));
+        }
+        if self.satellites.iter().enumerate().any(|(other, sat)| other != s && sat.is_on_air_or_awaits()) {
+            return Err(wait("another satellite's answer is awaited", Some(now.mono.plus(TAKE_TURNS_US))));
         }
         self.seal_gate(sat)?;
         link_gate(link, now, need.gate)?;

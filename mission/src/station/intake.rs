@@ -190,7 +190,8 @@ impl Station {
     /// is no room for the frame: then nothing may follow from it.
     fn archive(&mut self, l: usize, frame: &DownFrame<'_>, how: How, received: Now) -> Option<Heard> {
         let route = self.route(l);
-        let known = self.known_frame(frame.bytes(), received.utc);
+        let satellite = self.links[l].satellite;
+        let known = self.known_frame(satellite, frame.bytes(), received.utc);
         let id = known.unwrap_or_else(|| {
             self.ids.frame += 1;
             FrameId(self.ids.frame)
@@ -214,7 +215,7 @@ impl Station {
         if known.is_some() {
             self.journal.push_reception(reception);
         } else if self.journal.push_frame(record, reception) {
-            self.recent.push_back(Recent { id, at: received.utc, bytes: frame.bytes().into() });
+            self.recent.push_back(Recent { id, satellite, at: received.utc, bytes: frame.bytes().into() });
             if self.recent.len() > RECENT_FRAMES {
                 self.recent.pop_front();
             }
@@ -232,12 +233,14 @@ impl Station {
         Some(heard)
     }
 
-    fn known_frame(&mut self, bytes: &[u8], at: UtcUs) -> Option<FrameId> {
+    fn known_frame(&mut self, satellite: usize, bytes: &[u8], at: UtcUs) -> Option<FrameId> {
         while self.recent.front().is_some_and(|recent| at.0.saturating_sub(recent.at.0) > SAME_FRAME_US) {
             self.recent.pop_front();
         }
         let same = |recent: &&Recent| {
-            *recent.bytes == *bytes && at.0.abs_diff(recent.at.0) <= SAME_FRAME_US.unsigned_abs()
+            recent.satellite == satellite
+                && *recent.bytes == *bytes
+                && at.0.abs_diff(recent.at.0) <= SAME_FRAME_US.unsigned_abs()
         };
         self.recent.iter().find(same).map(|recent| recent.id)
     }

@@ -95,7 +95,8 @@ impl Station {
         }
     }
 
-    /// Satellite and link by name; the link of the satellite when none is named.
+    /// Satellite and link by name; when no link is named, the first that could transmit now, else the first that ever
+    /// could.
     fn places(&self, satellite: &SatelliteId, link: Option<&LinkId>) -> Result<(usize, usize), Refusal> {
         let s = self
             .satellite_index(satellite)
@@ -107,7 +108,8 @@ impl Station {
             }
             None => (0..self.links.len())
                 .filter(serves)
-                .find(|&l| !self.links[l].config.receive_only)
+                .filter(|&l| !self.links[l].config.receive_only)
+                .max_by_key(|&l| (self.links[l].may_transmit(), std::cmp::Reverse(l)))
                 .ok_or_else(|| Refusal::UnknownLink("(none that transmits)".to_owned()))?,
         };
         if self.links[l].config.receive_only {

@@ -139,6 +139,12 @@ impl Journal {
         is_news
     }
 
+    /// The reserve had no place for a frame. True when this is news.
+    pub(super) fn unreserved(&mut self) -> bool {
+        self.status.unreserved += 1;
+        self.status.unreserved == 1
+    }
+
     /// What was put into the reserve is all in the database: it may be emptied. Never in this life once a frame found
     /// a place in the reserve alone: the next start brings it back.
     pub(super) fn take_reserve_clear(&mut self) -> bool {

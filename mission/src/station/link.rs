@@ -99,6 +99,11 @@ impl Link {
         self.last_chunk = None;
     }
 
+    /// Up, armed, and no mere ear.
+    pub(super) fn may_transmit(&self) -> bool {
+        self.armed && self.state == LinkState::Ok && !self.config.receive_only
+    }
+
     /// A frame is being received: a candidate is open, and bytes came just now.
     pub(super) fn is_receiving(&self, now: MonoUs) -> bool {
         self.decoder.in_frame() && now < self.receiving_until()

@@ -225,6 +225,11 @@ impl Satellite {
         }
     }
 
+    /// Something of ours is on its way to it, or its answer is.
+    pub(super) fn is_on_air_or_awaits(&self) -> bool {
+        matches!(self.exchange, Exchange::OnAir { .. } | Exchange::Awaiting(_))
+    }
+
     pub(super) fn wake_at(&mut self, at: MonoUs) {
         self.wake = Some(self.wake.map_or(at, |wake| wake.min(at)));
     }

@@ -18,7 +18,9 @@ impl Station {
             return;
         }
         let id = sat.id.clone();
-        let route = self.links.iter().position(|link| link.satellite == s).map(|l| self.route(l));
+        // Over the link that heard it last.
+        let serving = (0..self.links.len()).filter(|&l| self.links[l].satellite == s);
+        let route = serving.max_by_key(|&l| self.links[l].last_bytes).map(|l| self.route(l));
         let message =
             if open { format!("{id} is in contact") } else { format!("{id} was not heard for a while") };
         let about = About { route, ..About::default() };

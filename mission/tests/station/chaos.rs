@@ -38,6 +38,8 @@ enum Act {
     FromFile(Vec<u8>),
     Confirm,
     ConfirmAll,
+    /// What is asked for last is confirmed first.
+    Swap,
     Refuse,
     Again,
     StrayBatch(u64),
@@ -77,6 +79,7 @@ fn act() -> impl Strategy<Value = Act> {
         1 => proptest::collection::vec(any::<u8>(), 0..30).prop_map(Act::FromFile),
         4 => Just(Act::Confirm),
         8 => Just(Act::ConfirmAll),
+        2 => Just(Act::Swap),
         2 => Just(Act::Refuse),
         1 => Just(Act::Again),
         1 => any::<u64>().prop_map(Act::StrayBatch),
@@ -219,6 +222,7 @@ fn carry_out(world: &mut World, act: &Act, watch: &mut Watch) {
             world.settle();
             world.confirms = false;
         }
+        Act::Swap if !world.waiting.is_empty() => world.waiting.rotate_left(1),
         Act::Refuse if !world.waiting.is_empty() => world.refuse(),
         Act::Again => {
             // Confirmations of things long confirmed.
@@ -240,9 +244,13 @@ fn carry_out(world: &mut World, act: &Act, watch: &mut Watch) {
                 world.handle(Input::PersistDone(BatchId(batch.saturating_add(1 << 40))));
             }
         }
-        Act::StrayWitness(counter) => {
+        Act::StrayWitness(back) => {
+            // Told again, or told of an older counter: true, and long known.
             let key = world.key();
-            world.handle(Input::WitnessDone { key, counter: Counter(*counter) });
+            if let mission::snapshot::Witness::At(at) = &world.witness {
+                let counter = Counter(at.0.saturating_sub(*back));
+                world.handle(Input::WitnessDone { key, counter });
+            }
         }
         Act::TxStarted(back) => {
             let tx = tx_back(world, *back);
@@ -313,7 +321,7 @@ fn carry_out(world: &mut World, act: &Act, watch: &mut Watch) {
             world.confirms = false;
             world.link_state(LinkState::Ok);
         }
-        Act::Confirm | Act::Refuse | Act::Smooth | Act::Mend => {}
+        Act::Confirm | Act::Swap | Act::Refuse | Act::Smooth | Act::Mend => {}
     }
 }
 

@@ -36,6 +36,7 @@ function storage(s) {
   const pairs = [];
   if (s.waiting > 0) pairs.push(["Records waiting", String(s.waiting)]);
   if (s.reserved > 0) pairs.push(["Frames in reserve", String(s.reserved)]);
+  if (s.unreserved > 0) pairs.push(["Frames in memory only", String(s.unreserved)]);
   if (s.derived_dropped > 0) pairs.push(["Derived rows dropped", String(s.derived_dropped)]);
   if (s.frames_lost > 0) pairs.push(["Frames lost", String(s.frames_lost)]);
   return pairs.length > 0 ? [counters(pairs)] : [];
