@@ -45,7 +45,7 @@ impl KeyFile {
 #[derive(Debug, Error)]
 pub enum KeyError {
     /// There is none.
-    #[error("key file {path} does not exist; make one with `gs-server key new {path}`", path = .0.display())]
+    #[error("key file {path} does not exist; make one with `gs-server key new {path}` (for a twin: with --simulated)", path = .0.display())]
     Missing(PathBuf),
     /// It cannot be opened or read.
     #[error("key file {path} cannot be read", path = .path.display())]

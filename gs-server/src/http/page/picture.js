@@ -18,7 +18,7 @@ export const refreshPicture = atMostEvery(1500, async () => {
   paintGrid();
   describe(image, chunks);
   const version = `${image.id}:${chunks.held}:${chunks.conflicts}`;
-  if (!shown?.startsWith(`${image.id}:`)) hide(map[0] === "." ? "Chunk 0, the head of the picture, is still missing." : "The picture is on its way.");
+  if (!shown?.startsWith(`${image.id}:`)) hide(map[0] === "." ? "Chunk 0, the head of the picture, is still missing." : "The picture is on its way: its first chunks are still missing.");
   if (chunks.held > 0 && version !== shown) load(image, version);
 });
 
