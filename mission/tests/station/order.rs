@@ -86,7 +86,10 @@ fn two_radios_of_one_station_never_send_together() {
     world.pass(S);
     assert_eq!(world.transmits.len(), 1, "the other one waits");
     world.radiate();
-    world.pass(3 * S);
+    world.pass(S);
+    assert_eq!(world.transmits.len(), 1, "a station that sends to one does not hear the other's answer");
+    world.hear(&frame(0, 1, &[]));
+    world.pass(S);
     assert_eq!(world.transmits.len(), 2);
     let counters: Vec<u64> = world.transmits.iter().map(crate::world::counter_of).collect();
     assert!(counters[0] < counters[1], "one key, one counter: {counters:?}");
