@@ -121,6 +121,14 @@ pub struct CommandView {
 /// A step in the life of a telecommand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageView {
+    /// Satellite.
+    pub satellite: String,
+    /// Station.
+    pub station: String,
+    /// Link.
+    pub link: String,
+    /// The id of the key that seals the command.
+    pub key: String,
     /// Attempt number, from 1; 0 before the first.
     pub attempt: u16,
     /// What was reached.

@@ -35,11 +35,30 @@ pub struct EventView {
     pub message: String,
 }
 
+/// Who did what: one line of the audit, which is never changed or shortened.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AuditView {
+    /// Its place, rising.
+    pub id: u64,
+    /// Station.
+    pub station: String,
+    /// When.
+    pub at: Time,
+    /// Who.
+    pub who: String,
+    /// A verb, e.g. `command.create`.
+    pub action: String,
+    /// What it was about, without secrets.
+    pub detail: String,
+}
+
 /// A limit that has been judged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LimitView {
     /// Satellite.
     pub satellite: String,
+    /// The station that judged it.
+    pub station: String,
     /// Parameter.
     pub parameter: String,
     /// The level now.

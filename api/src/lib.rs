@@ -5,7 +5,7 @@
 //! | [`Time`] | RFC 3339 in UTC with milliseconds, the only form of a time on the wire |
 //! | [`Version`], [`Health`] | the handshake: who is there, what it can, whether it is well |
 //! | [`StationView`] | how the station is right now |
-//! | [`FrameView`], [`TelemetryPage`], [`EventView`] | what was heard, the values in it, what happened |
+//! | [`FrameView`], [`TelemetryPage`], [`EventView`], [`AuditView`] | what was heard, the values in it, what happened, who did what |
 //! | [`CommandRequest`], [`CommandView`] | telecommands: asked for, and on their way |
 //! | [`telecommand`] | every telecommand of the ICD to JSON and back, with errors that name the field |
 //! | [`ImageView`], [`ChunkMap`], [`DownloadView`] | pictures and the orders to bring them home |
@@ -34,7 +34,7 @@ mod version;
 
 pub use command::{CommandRequest, CommandView, GateWord, Outcome, OutcomeWord, StageView};
 pub use download::{DownloadRequest, DownloadView};
-pub use event::{EventView, LimitView};
+pub use event::{AuditView, EventView, LimitView};
 pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
 pub use image::{ChunkMap, ImageView};
 pub use page::{Nothing, Page};

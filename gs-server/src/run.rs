@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt as _;
 use futures_util::future::BoxFuture;
-use mission::{Clock as _, Entropy, Intent, LinkId, Principal, Snapshot, StationConfig, UtcUs};
+use mission::{Clock as _, Entropy, Intent, LinkId, Principal, Snapshot, StationConfig, StationId, UtcUs};
 use protocol::{Key, KeyId};
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
@@ -200,7 +200,7 @@ pub async fn run_with(
     }
     // A stepped clock stands still until all actors run.
     let starting = timer.as_ref().map(|timer| timer.busy("start of the server"));
-    let store = open_store(&config, store).await?;
+    let store = open_store(&config, &station.station, store).await?;
     let timer = match timer {
         Some(timer) => timer,
         None => clock_for(&config, newest_event(&store).await?),
@@ -359,13 +359,14 @@ fn newest_event(store: &Store) -> BoxFuture<'static, Result<Option<UtcUs>, Store
     async move { Ok(store.events(&query).await?.first().map(|event| event.record.at)) }.boxed()
 }
 
-async fn open_store(config: &Config, brought: Option<Store>) -> Result<Store, RunError> {
+async fn open_store(config: &Config, station: &StationId, brought: Option<Store>) -> Result<Store, RunError> {
     let simulated = config.is_simulated();
     let store = match brought {
         Some(store) => store,
         None => {
             let options = StoreOptions {
                 folder: config.storage.folder.clone(),
+                station: Some(station.clone()),
                 simulated,
                 max_page_count: config.storage.max_page_count,
                 reserve_bytes: config.storage.reserve_bytes,

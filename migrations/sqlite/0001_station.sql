@@ -8,6 +8,7 @@
 
 create table meta (
     id integer primary key check (id = 1),
+    station text not null,
     simulated integer not null check (simulated in (0, 1)),
     created_at_us integer not null,
     schema_crc integer not null,
@@ -74,11 +75,32 @@ create table parameters (
     unique (satellite, name)
 ) strict;
 
+-- Each satellite, station and link that values came from and over: a small number stands in each of a million rows.
+create table routes (
+    id integer primary key check (id > 0),
+    satellite text not null,
+    station text not null,
+    link text not null,
+    crc integer not null,
+    unique (satellite, station, link)
+) strict;
+
+create trigger routes_are_kept before delete on routes
+begin
+    select raise(abort, 'a route is never deleted: values point at it');
+end;
+
+create trigger routes_are_never_changed before update on routes
+begin
+    select raise(abort, 'a route is never changed: values point at it');
+end;
+
 -- Clustered by parameter and time: a range of one parameter is one sweep over neighbouring pages.
 create table telemetry (
     parameter integer not null references parameters (id) deferrable initially deferred,
     at_us integer not null,
     frame integer not null references frames (id) deferrable initially deferred,
+    route integer not null references routes (id) deferrable initially deferred,
     value real,
     decoder_version integer not null,
     crc integer not null,
@@ -125,6 +147,10 @@ end;
 create table command_stages (
     id integer primary key,
     command integer not null references commands (id) deferrable initially deferred,
+    satellite text not null,
+    station text not null,
+    link text not null,
+    key text not null check (length(key) = 8),
     attempt integer not null,
     stage text not null check (stage in ('queued', 'sealed', 'radiating', 'radiated', 'answered', 'failed',
         'rejected', 'expired', 'cancelled', 'unknown')),
@@ -180,6 +206,7 @@ end;
 
 create table counter_floors (
     id integer primary key,
+    station text not null,
     key text not null check (length(key) = 8),
     counter integer not null check (counter >= 0),
     at_us integer not null,
@@ -270,6 +297,7 @@ create index downloads_active on downloads (satellite, id) where state = 'active
 create table limits (
     satellite text not null,
     parameter text not null,
+    station text not null,
     level text not null,
     since_us integer not null,
     value real,
@@ -307,6 +335,7 @@ end;
 
 create table audit (
     id integer primary key,
+    station text not null,
     at_us integer not null,
     who text not null,
     action text not null,
@@ -327,6 +356,7 @@ end;
 create table intents (
     principal text not null,
     idempotency_key text not null,
+    station text not null,
     digest blob not null check (length(digest) = 32),
     accepted text not null check (accepted in ('command', 'cancelled', 'download', 'download-cancelled', 'done')),
     subject integer,

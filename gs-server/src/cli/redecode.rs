@@ -102,6 +102,7 @@ impl Redecode {
         }
         let options = |simulated| StoreOptions {
             folder: self.data.clone(),
+            station: None,
             simulated,
             max_page_count: None,
             reserve_bytes: 0,

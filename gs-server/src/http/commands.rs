@@ -126,6 +126,10 @@ fn view(row: &CommandRow, last: Option<&StageRow>) -> Result<CommandView, Failur
 
 fn stage_view(row: &StageRow) -> StageView {
     StageView {
+        satellite: row.satellite.clone(),
+        station: row.station.clone(),
+        link: row.link.clone(),
+        key: row.key.clone(),
         attempt: small(row.attempt),
         stage: row.stage.clone(),
         at: time(row.at_us),

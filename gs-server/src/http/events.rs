@@ -1,6 +1,7 @@
-//! `GET /api/v1/events` and `/api/v1/limits`: what happened, and which values are out of bounds.
+//! `GET /api/v1/events`, `/api/v1/limits` and `/api/v1/audit`: what happened, which values are out of bounds, and who
+//! did what.
 
-use api::{EventView, LimitView, Page, ProblemKind};
+use api::{AuditView, EventView, LimitView, Page, ProblemKind};
 use axum::Json;
 use axum::extract::State;
 use mission::Level;
@@ -62,12 +63,38 @@ pub(super) async fn limits(State(app): State<App>) -> Result<Json<Page<LimitView
     let rows = app.state.store.limits().await?;
     let views = rows.into_iter().map(|row| LimitView {
         satellite: row.satellite,
+        station: row.station,
         parameter: row.parameter,
         level: row.level,
         since: time(row.since_us),
         value: row.value,
     });
     Ok(Json(whole(views.collect())))
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AuditAsked {
+    after: Option<i64>,
+    before: Option<i64>,
+    limit: Option<u32>,
+}
+
+pub(super) async fn audit(
+    State(app): State<App>,
+    Query(asked): Query<AuditAsked>,
+) -> Result<Json<Page<AuditView>>, Failure> {
+    let page = page(asked.after, asked.before, asked.limit)?;
+    let rows = app.state.store.audit(&page).await?;
+    let views = rows.into_iter().map(|row| AuditView {
+        id: number(row.id),
+        station: row.station,
+        at: time(row.at_us),
+        who: row.who,
+        action: row.action,
+        detail: row.detail,
+    });
+    Ok(Json(paged(views.collect(), &page, |row: &AuditView| row.id)))
 }
 
 /// An event as the wire has it.

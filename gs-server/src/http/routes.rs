@@ -79,6 +79,7 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/images/{id}/file", images::file),
         read("/api/v1/events", events::list),
         read("/api/v1/limits", events::limits),
+        read("/api/v1/audit", events::audit),
         write("/api/v1/links/{id}/arm", links::arm),
         write("/api/v1/links/{id}/disarm", links::disarm),
         write("/api/v1/clock/vouch", clock::vouch),

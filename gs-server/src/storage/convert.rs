@@ -155,9 +155,13 @@ impl CommandRow {
 }
 
 impl StageRow {
-    pub(super) fn of(record: &StageRecord) -> Result<Self, StoreError> {
+    pub(super) fn of(record: &StageRecord, route: &Route, key: &str) -> Result<Self, StoreError> {
         Ok(Self {
             command: int("command", record.command.0)?,
+            satellite: route.satellite.to_string(),
+            station: route.station.to_string(),
+            link: route.link.to_string(),
+            key: key.into(),
             attempt: i64::from(record.attempt),
             stage: record.stage.name().into(),
             at_us: record.at.0,
@@ -283,10 +287,11 @@ impl DownloadRow {
 }
 
 impl LimitRow {
-    pub(super) fn of(record: &LimitRecord) -> Self {
+    pub(super) fn of(record: &LimitRecord, station: &StationId) -> Self {
         Self {
             satellite: record.satellite.to_string(),
             parameter: record.parameter.clone(),
+            station: station.to_string(),
             level: record.level.name().into(),
             since_us: record.since.0,
             value: record.value.filter(|value| value.is_finite()),
@@ -347,7 +352,7 @@ impl EventRow {
 }
 
 impl IntentRow {
-    pub(super) fn of(receipt: &IntentReceipt) -> Result<Self, StoreError> {
+    pub(super) fn of(receipt: &IntentReceipt, station: &StationId) -> Result<Self, StoreError> {
         let (accepted, subject) = match receipt.accepted {
             Accepted::Command(id) => ("command", Some(id.0)),
             Accepted::Cancelled(id) => ("cancelled", Some(id.0)),
@@ -358,6 +363,7 @@ impl IntentRow {
         Ok(Self {
             principal: receipt.principal.to_string(),
             idempotency_key: receipt.idempotency_key.clone(),
+            station: station.to_string(),
             digest: receipt.digest.to_vec(),
             accepted: accepted.into(),
             subject: optional("subject", subject)?,

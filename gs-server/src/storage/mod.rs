@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mission::port::ReservedFrame;
-use mission::{Batch, Principal, SatelliteId, Snapshot};
+use mission::{Batch, Principal, SatelliteId, Snapshot, StationId};
 use protocol::{Counter, KeyId};
 use sqlx::sqlite::SqlitePool;
 
@@ -46,7 +46,7 @@ pub use read::{
 pub use redecode::{RedecodeProgress, RedecodeReport};
 pub use rows::{
     AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, EventRow, FrameRow, ImageRow, IntentRow,
-    LimitRow, MetaRow, ParameterRow, ReceptionRow, SealedRow, StageRow, TelemetryRow,
+    LimitRow, MetaRow, ParameterRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
 };
 
 use reserve::{Reserve, ReserveError};
@@ -59,6 +59,9 @@ pub const DATABASE: &str = "ground.sqlite3";
 pub struct StoreOptions {
     /// The data folder; made with mode 0700 when it does not exist.
     pub folder: PathBuf,
+    /// Whose memory it is; stands in the rows of records that do not name their station (audit, intents, counter
+    /// floors, limits). `None` for the name that the folder was last opened under.
+    pub station: Option<StationId>,
     /// Whether what is stored here is made up. The folder is marked at its birth; a mismatch is refused.
     pub simulated: bool,
     /// The largest size of the database in pages of 4096 bytes; `None` for SQLite's own limit.

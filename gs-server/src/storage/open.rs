@@ -6,10 +6,12 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use mission::StationId;
 use sqlx::migrate::MigrateError;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{AssertSqlSafe, Connection as _, SqliteConnection};
 
+use super::convert::parse;
 use super::lock::FolderLock;
 use super::reserve::{Reserve, ReserveError};
 use super::row::{Digest, Feed as _, Row as _, select, upsert};
@@ -48,8 +50,8 @@ pub(super) async fn open(options: StoreOptions) -> Result<Store, StoreError> {
     refuse_newer(&mut connection).await?;
     check_schema(&mut connection, &options).await?;
     migrate(&mut connection).await?;
-    mark(&mut connection, &options).await?;
-    let writer = Writer::new(connection, connect).await?;
+    let station = mark(&mut connection, &options).await?;
+    let writer = Writer::new(connection, connect, station).await?;
 
     let readers = SqlitePoolOptions::new()
         .max_connections(4)
@@ -236,20 +238,32 @@ async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     })
 }
 
-/// Marks a new database, and notes what its tables are now.
-async fn mark(connection: &mut SqliteConnection, options: &StoreOptions) -> Result<(), StoreError> {
+/// Marks a new database, and notes what its tables are now and whose they are: the station's name.
+async fn mark(connection: &mut SqliteConnection, options: &StoreOptions) -> Result<StationId, StoreError> {
     let schema_crc = schema_crc(connection).await?;
-    let row = match meta(connection).await? {
-        Some(row) if row.schema_crc == schema_crc => return Ok(()),
-        Some(row) => MetaRow { schema_crc, ..row },
+    let found = meta(connection).await?;
+    let station = match (&options.station, &found) {
+        (Some(station), _) => station.clone(),
+        (None, Some(row)) => parse("meta.station", &row.station)?,
+        (None, None) => return Err(StoreError::damaged("it does not say whose it is")),
+    };
+    let row = match found {
+        Some(row) if row.schema_crc == schema_crc && row.station == station.as_str() => return Ok(station),
+        Some(row) => MetaRow { schema_crc, station: station.to_string(), ..row },
         None => {
             // Told to people only, so the machine's clock will do, and a simulation need not wait for its first batch.
             let created_at_us = sqlx::query_scalar("select cast(unixepoch('subsec') * 1000000 as integer)")
                 .fetch_one(&mut *connection)
                 .await?;
-            MetaRow { id: 1, simulated: options.simulated, created_at_us, schema_crc }
+            MetaRow {
+                id: 1,
+                station: station.to_string(),
+                simulated: options.simulated,
+                created_at_us,
+                schema_crc,
+            }
         }
     };
     row.bind(sqlx::query(upsert::<MetaRow>("id"))).execute(connection).await?;
-    Ok(())
+    Ok(station)
 }

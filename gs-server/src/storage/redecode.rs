@@ -10,7 +10,7 @@ use sqlx::Row as _;
 use super::row::{Row, select};
 use super::rows::{
     AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, EventRow, FrameRow, ImageRow, IntentRow,
-    LimitRow, ParameterRow, ReceptionRow, SealedRow, StageRow, TelemetryRow,
+    LimitRow, ParameterRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::write::Transaction;
 use super::{Store, StoreError};
@@ -139,12 +139,17 @@ async fn remake(
     report.without_packet += u64::from(packet.is_none());
 
     let mut wanted = BTreeMap::new();
+    let route = match packet {
+        Some(_) => transaction.route([&frame.satellite, &frame.station, &frame.link]).await?,
+        None => 0,
+    };
     for point in packet.iter().flat_map(mission::telemetry::points) {
         let parameter = transaction.parameter(&frame.satellite, &point.parameter, point.unit).await?;
         let row = TelemetryRow {
             parameter,
             at_us: frame.heard_at_us,
             frame: frame.id,
+            route,
             value: point.value,
             decoder_version: i64::from(DECODER_VERSION),
         };
@@ -210,6 +215,7 @@ async fn finish(transaction: &mut Transaction<'_>, report: &mut RedecodeReport) 
 async fn verify_the_rest(store: &Store, report: &mut RedecodeReport) -> Result<(), StoreError> {
     verify::<ReceptionRow>(store, report).await?;
     verify::<ParameterRow>(store, report).await?;
+    verify::<RouteRow>(store, report).await?;
     verify::<CommandRow>(store, report).await?;
     verify::<StageRow>(store, report).await?;
     verify::<SealedRow>(store, report).await?;

@@ -10,6 +10,8 @@ row! {
     MetaRow in "meta" {
         /// Always 1.
         id: i64,
+        /// Whose memory it is: the name under which it was last opened.
+        station: String,
         /// Made by a simulation.
         simulated: bool,
         /// When the database was made, by the machine's clock.
@@ -80,6 +82,20 @@ row! {
 }
 
 row! {
+    /// From whom, by whom and over what values came.
+    RouteRow in "routes" {
+        /// Its number in this database.
+        id: i64,
+        /// From whom.
+        satellite: String,
+        /// By whom.
+        station: String,
+        /// Over what.
+        link: String,
+    }
+}
+
+row! {
     /// One value.
     TelemetryRow in "telemetry" {
         /// Which parameter, by its number in this database.
@@ -88,6 +104,8 @@ row! {
         at_us: i64,
         /// The frame it stands in.
         frame: i64,
+        /// From whom, by whom and over what that frame was first heard, by its number in this database.
+        route: i64,
         /// The value; `None` is invalid (NaN or infinite in the frame).
         value: Option<f64>,
         /// The rules by which it was derived.
@@ -136,6 +154,14 @@ row! {
     StageRow in "command_stages" {
         /// Which command.
         command: i64,
+        /// To whom.
+        satellite: String,
+        /// From where.
+        station: String,
+        /// Over what.
+        link: String,
+        /// The id of the key that seals it.
+        key: String,
         /// Attempt number, from 1; 0 before the first.
         attempt: i64,
         /// The word of [`mission::Stage`].
@@ -182,6 +208,8 @@ row! {
 row! {
     /// Counters at or below this are gone.
     CounterFloorRow in "counter_floors" {
+        /// Where it was confirmed.
+        station: String,
         /// The id of the key.
         key: String,
         /// The highest counter that counts as used.
@@ -286,6 +314,8 @@ row! {
         satellite: String,
         /// Which value.
         parameter: String,
+        /// Where it was judged.
+        station: String,
         /// The word of [`mission::Level`].
         level: String,
         /// Since when.
@@ -332,6 +362,8 @@ row! {
     AuditRow in "audit" {
         /// Its place.
         id: i64,
+        /// Where.
+        station: String,
         /// When.
         at_us: i64,
         /// Who.
@@ -350,6 +382,8 @@ row! {
         principal: String,
         /// Under which key.
         idempotency_key: String,
+        /// Where it was accepted.
+        station: String,
         /// SHA-256 of the request.
         digest: Vec<u8>,
         /// Which kind of [`mission::Accepted`].

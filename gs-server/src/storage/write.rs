@@ -2,19 +2,19 @@
 
 use std::collections::HashMap;
 
-use mission::Batch;
 use mission::record::{
     AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, ReceptionRssi,
-    Record, TelemetryRecord,
+    Record, Route, StageRecord, TelemetryRecord,
 };
+use mission::{Batch, StationId};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row as _, SqliteConnection};
 
-use super::convert::int;
+use super::convert::{int, route};
 use super::row::{Row, select, upsert};
 use super::rows::{
     AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, EventRow, FrameRow, ImageRow, IntentRow,
-    LimitRow, ParameterRow, ReceptionRow, SealedRow, StageRow, TelemetryRow,
+    LimitRow, ParameterRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::{StoreError, StoredEvent};
 
@@ -25,6 +25,8 @@ const ROWS_PER_STATEMENT: usize = 500;
 pub(super) struct Writer {
     connection: Option<SqliteConnection>,
     options: SqliteConnectOptions,
+    /// Whose memory this is: for rows whose record does not say it.
+    station: StationId,
     memory: Memory,
     /// A transaction was begun and its end is not known, e.g. because whoever waited for it went away.
     unsettled: bool,
@@ -39,6 +41,9 @@ struct Memory {
     /// Numbers of parameters by satellite and name.
     parameters: HashMap<String, HashMap<String, i64>>,
     last_parameter: i64,
+    /// Numbers of routes by satellite, station and link.
+    routes: HashMap<[String; 3], i64>,
+    last_route: i64,
 }
 
 impl Memory {
@@ -52,6 +57,11 @@ impl Memory {
                 .await?,
             ..Self::default()
         };
+        for row in sqlx::query(select::<RouteRow>("order by id")).fetch_all(&mut *connection).await? {
+            let row = RouteRow::read(&row)?;
+            memory.last_route = row.id;
+            memory.routes.insert([row.satellite, row.station, row.link], row.id);
+        }
         for row in sqlx::query(select::<ParameterRow>("order by id")).fetch_all(connection).await? {
             let row = ParameterRow::read(&row)?;
             memory.last_parameter = row.id;
@@ -65,9 +75,10 @@ impl Writer {
     pub(super) async fn new(
         mut connection: SqliteConnection,
         options: SqliteConnectOptions,
+        station: StationId,
     ) -> Result<Self, StoreError> {
         let memory = Memory::read(&mut connection).await?;
-        Ok(Self { connection: Some(connection), options, memory, unsettled: false, closed: false })
+        Ok(Self { connection: Some(connection), options, station, memory, unsettled: false, closed: false })
     }
 
     pub(super) async fn apply(&mut self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
@@ -93,7 +104,7 @@ impl Writer {
 
     /// The transaction that [`Self::begin`] opened.
     pub(super) fn within<'a>(&'a mut self, connection: &'a mut SqliteConnection) -> Transaction<'a> {
-        Transaction { connection, memory: &mut self.memory }
+        Transaction { connection, station: &self.station, memory: &mut self.memory }
     }
 
     /// Commits what succeeded. When it did not, or the commit fails, nothing of it remains.
@@ -167,6 +178,7 @@ impl Writer {
 /// A transaction that is open.
 pub(super) struct Transaction<'a> {
     pub(super) connection: &'a mut SqliteConnection,
+    station: &'a StationId,
     memory: &'a mut Memory,
 }
 
@@ -174,19 +186,19 @@ impl Transaction<'_> {
     async fn batch(&mut self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
         let mut events = Vec::new();
         for record in &batch.records {
-            events.extend(self.write(record).await?);
+            events.extend(self.write(record, batch).await?);
         }
         Ok(events)
     }
 
-    async fn write(&mut self, record: &Record) -> Result<Option<StoredEvent>, StoreError> {
+    async fn write(&mut self, record: &Record, batch: &Batch) -> Result<Option<StoredEvent>, StoreError> {
         match record {
             Record::Frame(frame) => self.frame(&FrameRow::of(frame)?).await?,
             Record::Reception(reception) => self.insert(&ReceptionRow::of(reception)?).await?,
             Record::ReceptionRssi(rssi) => self.set_rssi(rssi).await?,
             Record::Telemetry(telemetry) => self.telemetry(telemetry).await?,
             Record::Command(command) => self.insert(&CommandRow::of(command)?).await?,
-            Record::Stage(stage) => self.insert(&StageRow::of(stage)?).await?,
+            Record::Stage(stage) => self.stage(stage, batch).await?,
             Record::Sealed(sealed) => self.insert(&SealedRow::of(sealed)?).await?,
             Record::CounterFloor(floor) => self.counter_floor(floor).await?,
             Record::Image(image) => self.image(image).await?,
@@ -195,7 +207,7 @@ impl Transaction<'_> {
             Record::Limit(limit) => self.limit(limit).await?,
             Record::Event(event) => return self.event(event).await.map(Some),
             Record::Audit(audit) => self.audit(audit).await?,
-            Record::Intent(receipt) => self.insert(&IntentRow::of(receipt)?).await?,
+            Record::Intent(receipt) => self.insert(&IntentRow::of(receipt, self.station)?).await?,
         }
         Ok(None)
     }
@@ -262,7 +274,33 @@ impl Transaction<'_> {
         Ok(())
     }
 
+    /// A stage, with the route and the key of its command: out of the same batch, or as it was stored.
+    async fn stage(&mut self, record: &StageRecord, batch: &Batch) -> Result<(), StoreError> {
+        let beside = batch.records.iter().find_map(|other| match other {
+            Record::Command(command) if command.id == record.command => Some(command),
+            _ => None,
+        });
+        let row = match beside {
+            Some(command) => StageRow::of(record, &command.route, &command.key.to_string())?,
+            None => {
+                let found = sqlx::query("select satellite, station, link, key from commands where id = ?")
+                    .bind(int("command", record.command.0)?)
+                    .fetch_optional(&mut *self.connection)
+                    .await?;
+                let Some(found) = found else {
+                    return Err(StoreError::Conflict(format!("there is no command {}", record.command)));
+                };
+                let text = |column| found.try_get::<String, _>(column);
+                let route = route(&text("satellite")?, &text("station")?, &text("link")?)?;
+                StageRow::of(record, &route, &text("key")?)?
+            }
+        };
+        self.insert(&row).await
+    }
+
     async fn telemetry(&mut self, record: &TelemetryRecord) -> Result<(), StoreError> {
+        let Route { satellite, station, link } = &record.route;
+        let route = self.route([satellite.as_str(), station.as_str(), link.as_str()]).await?;
         let mut rows = Vec::with_capacity(record.points.len());
         for point in &record.points {
             let parameter =
@@ -271,6 +309,7 @@ impl Transaction<'_> {
                 parameter,
                 at_us: record.at.0,
                 frame: int("frame", record.frame.0)?,
+                route,
                 value: point.value.filter(|value| value.is_finite()),
                 decoder_version: i64::from(record.decoder_version),
             });
@@ -282,24 +321,39 @@ impl Transaction<'_> {
     pub(super) async fn insert_telemetry(&mut self, rows: &[TelemetryRow]) -> Result<(), StoreError> {
         for rows in rows.chunks(ROWS_PER_STATEMENT) {
             let mut statement = sqlx::QueryBuilder::<sqlx::Sqlite>::new(
-                "insert into telemetry (parameter, at_us, frame, value, decoder_version, crc) ",
+                "insert into telemetry (parameter, at_us, frame, route, value, decoder_version, crc) ",
             );
             statement.push_values(rows, |mut values, row| {
                 values
                     .push_bind(row.parameter)
                     .push_bind(row.at_us)
                     .push_bind(row.frame)
+                    .push_bind(row.route)
                     .push_bind(row.value)
                     .push_bind(row.decoder_version)
                     .push_bind(row.crc());
             });
             statement.push(
-                " on conflict (parameter, at_us, frame) do update set value = excluded.value,
-                 decoder_version = excluded.decoder_version, crc = excluded.crc",
+                " on conflict (parameter, at_us, frame) do update set route = excluded.route,
+                 value = excluded.value, decoder_version = excluded.decoder_version, crc = excluded.crc",
             );
             statement.build().execute(&mut *self.connection).await?;
         }
         Ok(())
+    }
+
+    /// The number of a satellite, station and link; a new one gets the next.
+    pub(super) async fn route(&mut self, names: [&str; 3]) -> Result<i64, StoreError> {
+        let names = names.map(str::to_owned);
+        if let Some(id) = self.memory.routes.get(&names) {
+            return Ok(*id);
+        }
+        let id = self.memory.last_route + 1;
+        let [satellite, station, link] = names.clone();
+        self.insert(&RouteRow { id, satellite, station, link }).await?;
+        self.memory.last_route = id;
+        self.memory.routes.insert(names, id);
+        Ok(id)
     }
 
     /// The number of a parameter; a new one gets the next.
@@ -322,6 +376,7 @@ impl Transaction<'_> {
 
     async fn counter_floor(&mut self, record: &CounterFloorRecord) -> Result<(), StoreError> {
         let row = CounterFloorRow {
+            station: self.station.to_string(),
             key: record.key.to_string(),
             counter: int("counter", record.counter.0)?,
             at_us: record.at.0,
@@ -339,7 +394,7 @@ impl Transaction<'_> {
     }
 
     async fn limit(&mut self, record: &LimitRecord) -> Result<(), StoreError> {
-        self.upsert("satellite, parameter", &LimitRow::of(record)).await
+        self.upsert("satellite, parameter", &LimitRow::of(record, self.station)).await
     }
 
     async fn event(&mut self, record: &EventRecord) -> Result<StoredEvent, StoreError> {
@@ -352,6 +407,7 @@ impl Transaction<'_> {
     async fn audit(&mut self, record: &AuditRecord) -> Result<(), StoreError> {
         let row = AuditRow {
             id: self.memory.last_audit + 1,
+            station: self.station.to_string(),
             at_us: record.at.0,
             who: record.who.to_string(),
             action: record.action.into(),

@@ -57,6 +57,7 @@ impl Bench {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(StoreOptions {
             folder: folder.path().join("data"),
+            station: Some(station().station),
             simulated: true,
             max_page_count: None,
             reserve_bytes: 1 << 16,

@@ -45,6 +45,30 @@ async fn a_command_is_queued_and_can_be_looked_at_and_withdrawn() {
 }
 
 #[tokio::test]
+async fn the_audit_tells_who_did_what_page_by_page() {
+    let bench = Bench::new().await;
+    bench.post("/api/v1/commands", "a", &ping()).await.ok();
+    bench.post("/api/v1/commands/1/cancel", "b", &json!({})).await.ok();
+    let newest = bench.get("/api/v1/audit?limit=1").await.ok();
+    let row = &newest["items"][0];
+    assert_eq!((&row["who"], &row["action"]), (&json!("operator"), &json!("command.cancel")));
+    assert_eq!((&row["station"], &row["detail"]), (&json!("bench"), &json!("command 1")));
+    assert!(row["at"].as_str().unwrap().ends_with('Z'));
+    let before = format!("/api/v1/audit?before={}", newest["next"]);
+    let older = bench.get(&before).await.ok();
+    assert_eq!((&older["items"][0]["action"], &older["next"]), (&json!("command.create"), &Value::Null));
+    assert_eq!(older["items"].as_array().unwrap().len(), 1);
+    assert_eq!(bench.get("/api/v1/audit?who=eve").await.problem(), "bad-parameter");
+
+    let command = bench.get("/api/v1/commands/1").await.ok();
+    for stage in command["stages"].as_array().unwrap() {
+        for field in ["satellite", "station", "link", "key"] {
+            assert_eq!(stage[field], command[field], "{field}");
+        }
+    }
+}
+
+#[tokio::test]
 async fn the_same_key_gives_the_same_answer_and_another_body_is_refused() {
     let bench = Bench::new().await;
     let first = bench.post("/api/v1/commands", "one", &ping()).await;

@@ -116,7 +116,14 @@ async fn a_command_is_read_back_with_its_life() {
     store.close().await.unwrap();
     drop(store);
     let store = reopen(&parent).await.unwrap();
+    let late = batch(vec![Record::Stage(stage(2, 0, Stage::Cancelled, NOON_US + 2))]);
+    store.apply(&late).await.unwrap();
+    let cancelled = store.command(2).await.unwrap().unwrap();
     let life = store.command(1).await.unwrap().unwrap();
+    for stage in life.stages.iter().chain(&cancelled.stages) {
+        let found = [&stage.satellite, &stage.station, &stage.link, &stage.key];
+        assert_eq!(found, ["pixelsat-1", "oslo", route().link.as_str(), &key().to_string()]);
+    }
     assert_eq!(life.command.telecommand().unwrap(), telecommand);
     assert_eq!((life.command.name.as_str(), life.command.download), ("GetImageChunk", Some(1)));
     assert_eq!((life.command.gate.as_str(), life.command.priority), ("heard", -3));
@@ -132,7 +139,7 @@ async fn a_command_is_read_back_with_its_life() {
         list.into_iter().map(|now| (now.command.id, now.last.unwrap().stage)).collect()
     };
     let everything = now(store.commands(&CommandQuery::default()).await.unwrap());
-    assert_eq!(everything, [(2, "queued".into()), (1, "sealed".into())]);
+    assert_eq!(everything, [(2, "cancelled".into()), (1, "sealed".into())]);
     let query = CommandQuery { stage: Some(Stage::Sealed), ..CommandQuery::default() };
     assert_eq!(now(store.commands(&query).await.unwrap()), [(1, "sealed".into())]);
     let query = CommandQuery { key: Some("00000000".into()), ..CommandQuery::default() };
@@ -200,8 +207,8 @@ async fn downloads_limits_audit_and_intents_are_read_back() {
     let limits: Vec<_> = limits.iter().map(|l| (l.parameter.as_str(), l.level.as_str(), l.value)).collect();
     assert_eq!(limits, [("heartbeat.rad", "normal", None), ("heartbeat.temp", "severe", Some(61.5))]);
     let audit = store.audit(&Page::default()).await.unwrap();
-    let audit: Vec<_> = audit.iter().map(|row| (row.id, row.action.as_str())).collect();
-    assert_eq!(audit, [(2, "command.cancel"), (1, "command.create")]);
+    let audit: Vec<_> = audit.iter().map(|row| (row.id, row.station.as_str(), row.action.as_str())).collect();
+    assert_eq!(audit, [(2, "oslo", "command.cancel"), (1, "oslo", "command.create")]);
 
     let all = [
         Accepted::Command(CommandId(1)),

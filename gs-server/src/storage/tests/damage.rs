@@ -43,6 +43,7 @@ async fn everything(store: &Store) -> Result<Vec<String>, StoreError> {
 async fn template(folder: &Path) -> Vec<String> {
     let store = Store::open(StoreOptions {
         folder: folder.to_path_buf(),
+        station: Some(route().station),
         simulated: false,
         max_page_count: None,
         reserve_bytes: 0,

@@ -85,6 +85,7 @@ async fn child() {
     let Ok(folder) = std::env::var(FOLDER) else { return };
     let options = StoreOptions {
         folder: folder.into(),
+        station: Some(super::records::route().station),
         simulated: false,
         max_page_count: None,
         reserve_bytes: 16 * 512,

@@ -17,6 +17,7 @@ async fn child() {
     let Ok(folder) = std::env::var(FOLDER) else { return };
     let store = super::Store::open(super::StoreOptions {
         folder: folder.into(),
+        station: Some(super::records::route().station),
         simulated: false,
         max_page_count: None,
         reserve_bytes: 0,

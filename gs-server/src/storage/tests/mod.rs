@@ -23,6 +23,7 @@ async fn fresh() -> (tempfile::TempDir, Store) {
 fn options(parent: &tempfile::TempDir) -> StoreOptions {
     StoreOptions {
         folder: parent.path().join("data"),
+        station: Some(records::route().station),
         simulated: false,
         max_page_count: None,
         reserve_bytes: 64 * 1024,

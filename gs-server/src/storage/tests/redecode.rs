@@ -38,14 +38,23 @@ async fn what_is_missing_wrong_or_too_much_is_mended() {
     meddle(&store, "delete from telemetry where frame = 3").await;
     meddle(&store, "update telemetry set value = 1e9 where frame = 4 and value = 42.0").await;
     meddle(&store, "update telemetry set decoder_version = 0 where frame = 5").await;
-    meddle(&store, "insert into telemetry values (1, 5, 6, 1.0, 1, 0)").await;
+    let mut elsewhere = heard(7);
+    elsewhere.retain_mut(|record| match record {
+        Record::Telemetry(telemetry) => {
+            telemetry.route.station = other_route().station;
+            true
+        }
+        _ => false,
+    });
+    store.apply(&batch(elsewhere)).await.unwrap();
+    meddle(&store, "insert into telemetry values (1, 5, 6, 1, 1.0, 1, 0)").await;
     let mut records = heard(21);
     records.retain(|record| matches!(record, Record::Frame(_)));
     store.apply(&batch(records)).await.unwrap();
 
     let report = store.redecode(|_| {}).await.unwrap();
     assert_eq!((report.added, report.removed), (29 + 29, 1), "{report:?}");
-    assert_eq!((report.changed, report.damaged), (1 + 29, 1 + 29), "{report:?}");
+    assert_eq!((report.changed, report.damaged), (1 + 29 + 29, 1 + 29), "{report:?}");
     assert_eq!(report.findings.len(), 30);
     let again = store.redecode(|_| {}).await.unwrap();
     assert_eq!(

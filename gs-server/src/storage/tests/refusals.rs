@@ -84,6 +84,8 @@ async fn history_cannot_be_rewritten() {
         "update frames set heard_at_us = 1",
         "delete from frames",
         "delete from receptions",
+        "update routes set link = 'x'",
+        "delete from routes",
         "update commands set priority = 9",
         "delete from commands",
         "update command_stages set stage = 'answered'",
