@@ -224,7 +224,9 @@ impl Engine {
                     self.handle(Input::Intent(envelope));
                 }
             }
-            Outcome::Reserve { refused: Some(reason) } => self.handle(Input::ReserveFailed { reason: &reason }),
+            Outcome::Reserve { refused: Some(reason) } => {
+                self.handle(Input::ReserveFailed { reason: &reason })
+            }
             Outcome::Reserve { refused: None } => {}
             Outcome::Clock { synchronised } => self.handle(Input::Clock { synchronised }),
         }

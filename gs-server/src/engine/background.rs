@@ -12,14 +12,26 @@ use crate::storage::{Store, StoreError, StoredEvent, StoredIntent};
 
 /// Something that was done.
 pub(super) enum Outcome {
-    Persisted { batch: BatchId, result: Result<Vec<StoredEvent>, StoreError> },
-    Witness { key: KeyId, counter: Counter, result: Result<(), StoreError> },
-    LookedUp { intent: IntentId, result: Result<Option<StoredIntent>, StoreError> },
+    Persisted {
+        batch: BatchId,
+        result: Result<Vec<StoredEvent>, StoreError>,
+    },
+    Witness {
+        key: KeyId,
+        counter: Counter,
+        result: Result<(), StoreError>,
+    },
+    LookedUp {
+        intent: IntentId,
+        result: Result<Option<StoredIntent>, StoreError>,
+    },
     /// Why a raw frame found no place in the reserve, if so.
     Reserve {
         refused: Option<String>,
     },
-    Clock { synchronised: bool },
+    Clock {
+        synchronised: bool,
+    },
 }
 
 pub(super) enum ReserveWork {
