@@ -1,6 +1,6 @@
 //! API v1 and the first page, under axum.
 //!
-//! [`routes`] is the table: every path, whether it reads or writes, and who answers. Around all of it lies one guard
+//! `routes` is the table: every path, whether it reads or writes, and who answers. Around all of it lies one guard
 //! (names under which we answer, problems, security headers), around every write another (origin, token, idempotency
 //! key, JSON). One file per group of operations; `problem` is the only place that turns errors into answers.
 //!
