@@ -101,7 +101,7 @@ def peaks(sky, low, high, sign):
         a, b = high - golden * (high - low), low + golden * (high - low)
         left = sign * sky.altitude(a) > sign * sky.altitude(b)
         low, high = np.where(left, low, a), np.where(left, b, high)
-        if np.max(high - low) < 1e-3:
+        if np.max(high - low) < 1e-6:
             break
     return 0.5 * (low + high)
 

@@ -3,74 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a test's helpers fail by panicking")]
 
 use tle::passes::{EndCause, PassFinder, PassSearch};
-use tle::{
-    EarthOrientation, Elements, LookAngles, Propagator, Station, UtcInstant, ecef_from_teme, gmst_rad,
-};
+use tle::{EarthOrientation, LookAngles, Propagator, Station, UtcInstant, ecef_from_teme, gmst_rad};
 
-const T0: UtcInstant = UtcInstant::from_unix_us(1_790_000_000_123_456);
+mod common;
 
-#[derive(Clone, Copy)]
-enum Kind {
-    Low,
-    Eccentric,
-    Deep,
-}
-
-/// Sets that step through the ranges of a kind without repeating.
-fn elements(kind: Kind, k: u32) -> Elements {
-    let part = |step: f64| (f64::from(k + 1) * step).fract();
-    let (mean_motion_rev_day, eccentricity) = match kind {
-        Kind::Low => (13.0 + 3.0 * part(0.445), 0.019 * part(0.618_034)),
-        Kind::Eccentric => {
-            // Perigees from 250 to 1450 km, eccentricities to 0.5: periods below and above 225 minutes.
-            let e = 0.02 + 0.5 * part(0.618_034);
-            let a_km = (6378.0 + 250.0 + 1200.0 * part(0.31)) / (1.0 - e);
-            (86_400.0 / (std::f64::consts::TAU * (a_km.powi(3) / 398_600.8).sqrt()), e)
-        }
-        Kind::Deep => match k % 5 {
-            0 => (2.0057 + 0.001 * part(0.4), 0.69 + 0.05 * part(0.3)),
-            1 => (1.0027 + 0.0005 * (part(0.4) - 0.5), 0.02 * part(0.3)),
-            2 => (2.0057, 0.001 + 0.01 * part(0.7)),
-            3 => (2.2, 0.73),
-            _ => (0.4 + 4.0 * part(0.77), 0.6 * part(0.123)),
-        },
-    };
-    Elements {
-        name: None,
-        object_id: None,
-        norad_cat_id: Some(k),
-        epoch: T0,
-        mean_motion_rev_day,
-        eccentricity,
-        inclination_deg: 180.0 * part(0.754_878),
-        raan_deg: 360.0 * part(0.569_84),
-        arg_of_perigee_deg: 360.0 * part(0.819_173),
-        mean_anomaly_deg: 360.0 * part(0.671_044),
-        bstar: 2e-4 * part(0.549_7),
-        mean_motion_dot: 0.0,
-        mean_motion_ddot: 0.0,
-        ephemeris_type: Some(0),
-        classification: None,
-        element_set_no: None,
-        rev_at_epoch: None,
-        further: Vec::new(),
-    }
-}
-
-fn stations() -> Vec<Station> {
-    [
-        (90.0, 0.0, 2800.0),
-        (-90.0, 77.0, 2800.0),
-        (78.23, 15.4, 450.0),
-        (47.4, 8.5, 500.0),
-        (0.0, -179.999, 0.0),
-        (-16.5, 180.0, 10.0),
-        (31.5, 35.5, -430.0),
-        (-33.1, -70.7, 900.0),
-    ]
-    .map(|(latitude, longitude, height)| Station::new(latitude, longitude, height).unwrap())
-    .to_vec()
-}
+use common::{EPOCH as T0, Kind, elements, stations};
 
 fn look(propagator: &Propagator, station: &Station, at: UtcInstant) -> Option<LookAngles> {
     let state = propagator.at(at).ok()?;

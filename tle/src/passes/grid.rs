@@ -4,14 +4,14 @@ use std::f64::consts::{PI, TAU};
 
 use crate::frames::EARTH_RATE_RAD_S;
 use crate::propagator::{PropagationError, SGP4_EARTH_RADIUS_KM, SGP4_MU_KM3_S2, State};
-use crate::vector::{dot, norm};
+use crate::vector::{dot, norm, sub};
 
 use super::motion::Motion;
 use super::piece::{Clock, Node, Piece};
 
 /// Steps in a revolution. With true SGP4 at every crossing the grid need only find them: pieces of a twelfth stay within
 /// 30 m.
-const STEPS_PER_REVOLUTION: f64 = 12.0;
+const STEPS_PER_REVOLUTION: f64 = 10.0;
 /// The Earth turns by no more than this in one step, rad: it bends the path of slow objects.
 const EARTH_TURN_PER_STEP_RAD: f64 = 0.5;
 /// No object that stays up goes round faster; keeps steps of nonsensical elements from shrinking. Minutes.
@@ -23,6 +23,10 @@ const BLOCK_STEPS: usize = 512;
 const BLOCK_STEPS_ECCENTRIC: usize = 96;
 /// Added to every culling angle, rad: the difference of geodetic and geocentric up (0.0034) and rounding.
 const CULLING_MARGIN_RAD: f64 = 0.005;
+/// States of a block whose velocity is compared with the way of their position, and the difference from which on every
+/// grid point takes its velocity from there, km/s. It costs a state per grid point.
+const VELOCITY_SAMPLES: usize = 3;
+const VELOCITY_FLAW_KM_S: f64 = 0.005;
 /// Where a piece comes this close to the radius below which SGP4 calls an object decayed, true states are asked for.
 const DECAY_WATCH_KM: f64 = 10.0;
 
@@ -106,21 +110,44 @@ impl Block {
             column.clear();
             column.extend(self.nodes.iter().map(|node| node.state.r_ecef_km[axis] / node.radius_km));
         }
-        // The way along a cell: its inertial arc and the Earth's turning. Any point of it is within half of that of
-        // one of its two nodes.
-        let swell = 1.002 + if clock.e > 0.0 { 0.04 } else { 0.0 };
         self.cos_reach.clear();
+        if clock.e == 0.0 {
+            self.reach_of_round_orbit(reach);
+        } else {
+            self.reach_by_node(reach);
+        }
+    }
+
+    /// Where a station must stand to see anything of the half steps about a node. The way along a step is its inertial arc
+    /// and the Earth's turning; any point of it is within half of that of one of its two nodes.
+    fn reach_by_node(&mut self, reach: &Reach) {
+        // An apogee between two nodes lies higher than both.
+        const SWELL: f64 = 1.04;
         let mut before = (0.0f64, 0.0f64);
         for (k, node) in self.nodes.iter().enumerate() {
             let after = self.nodes.get(k + 1).map_or((0.0, 0.0), |next| {
                 let arc = dot(node.direction_teme, next.direction_teme).clamp(-1.0, 1.0).acos();
                 (arc + EARTH_RATE_RAD_S * (next.t_s - node.t_s), next.radius_km)
             });
-            let radius_km = node.radius_km.max(before.1).max(after.1) * swell;
+            let radius_km = node.radius_km.max(before.1).max(after.1) * SWELL;
             let angle = reach.half_angle_rad(radius_km) + 0.5 * before.0.max(after.0) + CULLING_MARGIN_RAD;
             self.cos_reach.push(angle.min(PI).cos());
             before = (after.0, node.radius_km);
         }
+    }
+
+    /// The same for all nodes at once, by the longest step and the greatest height.
+    fn reach_of_round_orbit(&mut self, reach: &Reach) {
+        const SWELL: f64 = 1.002;
+        let (mut cos_arc, mut step_s, mut radius_km) = (1.0f64, 0.0f64, 0.0f64);
+        for pair in self.nodes.windows(2) {
+            cos_arc = cos_arc.min(dot(pair[0].direction_teme, pair[1].direction_teme));
+            step_s = step_s.max(pair[1].t_s - pair[0].t_s);
+            radius_km = radius_km.max(pair[0].radius_km).max(pair[1].radius_km);
+        }
+        let way = cos_arc.clamp(-1.0, 1.0).acos() + EARTH_RATE_RAD_S * step_s;
+        let angle = reach.half_angle_rad(radius_km * SWELL) + 0.5 * way + CULLING_MARGIN_RAD;
+        self.cos_reach.resize(self.nodes.len(), angle.min(PI).cos());
     }
 }
 
@@ -137,6 +164,9 @@ pub(super) struct Grid {
     times: Vec<f64>,
     anomalies: Vec<f64>,
     states: Vec<Result<State, PropagationError>>,
+    velocities_are_flawed: bool,
+    /// How far below its two grid points the perigee may lie, and what to watch above the surface, km.
+    dip_km: f64,
 }
 
 impl Grid {
@@ -145,6 +175,7 @@ impl Grid {
         let rate = TAU / (shape.period_min.max(SHORTEST_PERIOD_MIN) * 60.0);
         let longest_step_s = EARTH_TURN_PER_STEP_RAD / EARTH_RATE_RAD_S;
         let step_rad = (TAU / STEPS_PER_REVOLUTION).min(longest_step_s * rate / (1.0 + e));
+        let axis_km = (SGP4_MU_KM3_S2 / (rate * rate)).cbrt();
         let clock = Clock { e, rate, perigee_s: start_s - shape.mean_anomaly_rad / rate };
         Self {
             reach,
@@ -156,6 +187,8 @@ impl Grid {
             times: Vec::new(),
             anomalies: Vec::new(),
             states: Vec::new(),
+            velocities_are_flawed: false,
+            dip_km: axis_km * e * step_rad * step_rad / 8.0 + 5.0 * DECAY_WATCH_KM,
         }
     }
 
@@ -170,6 +203,7 @@ impl Grid {
         let mut states = std::mem::take(&mut self.states);
         states.clear();
         motion.many_teme(&self.times, |_, _, state| states.push(state));
+        self.velocities_are_flawed = self.flawed(motion, &states);
         self.fill(motion, &states, block);
         self.states = states;
         block.close(&self.reach, self.clock);
@@ -212,6 +246,25 @@ impl Grid {
         }
     }
 
+    /// Whether SGP4's velocities are no guide here: drag has taken over, as a rule.
+    fn flawed(&self, motion: &mut Motion<'_>, states: &[Result<State, PropagationError>]) -> bool {
+        if motion.is_round() {
+            return false;
+        }
+        (1..=VELOCITY_SAMPLES).any(|k| {
+            let index = (states.len() - 1) * k / VELOCITY_SAMPLES;
+            let Ok(state) = &states[index] else { return true };
+            let path = motion.along_its_path(state, self.times[index]);
+            norm(sub(path.v_teme_km_s, state.v_teme_km_s)) > VELOCITY_FLAW_KM_S
+        })
+    }
+
+    /// A grid point from a state.
+    fn node(&self, motion: &mut Motion<'_>, t_s: f64, anomaly: f64, state: &State) -> Node {
+        let path = if self.velocities_are_flawed { motion.along_its_path(state, t_s) } else { *state };
+        Node::new(t_s, anomaly, motion.turned(&path, t_s), state.r_teme_km)
+    }
+
     /// Turns states into nodes, and finds where they begin and end.
     fn fill(
         &mut self,
@@ -234,10 +287,9 @@ impl Grid {
             let t_s = self.times[index];
             match state {
                 Ok(state) => {
-                    let node =
-                        Node::new(t_s, self.anomalies[index], motion.turned(state, t_s), state.r_teme_km);
+                    let node = self.node(motion, t_s, self.anomalies[index], state);
                     if let Some(fault) = gap.take() {
-                        let edge = self.edge(motion, &node, gap_since_s);
+                        let (edge, _) = self.edge(motion, &node, gap_since_s, fault);
                         if block.nodes.is_empty() {
                             block.opens_after = Some(fault);
                         }
@@ -250,13 +302,14 @@ impl Grid {
                 }
                 Err(fault) => {
                     if gap.is_none() {
+                        gap = Some(*fault);
                         if let Some(last) = block.nodes.last().copied() {
-                            let edge = self.edge(motion, &last, t_s);
+                            let (edge, first_fault) = self.edge(motion, &last, t_s, *fault);
+                            gap = Some(first_fault);
                             if edge.t_s > last.t_s {
                                 block.push(edge, Ok(()));
                             }
                         }
-                        gap = Some(*fault);
                     }
                     gap_since_s = t_s;
                 }
@@ -266,34 +319,41 @@ impl Grid {
         self.last = gap.map(Err).or_else(|| block.nodes.last().copied().map(Ok));
     }
 
-    /// The last instant with a state between a node, which has one, and a time that has none (before or after it).
-    fn edge(&self, motion: &mut Motion<'_>, good: &Node, bad_s: f64) -> Node {
-        let mut edge = *good;
+    /// The last instant with a state between a node, which has one, and a time that has none (before or after it), and why
+    /// there is none beyond.
+    fn edge(
+        &self,
+        motion: &mut Motion<'_>,
+        good: &Node,
+        bad_s: f64,
+        fault: PropagationError,
+    ) -> (Node, PropagationError) {
+        let (mut edge, mut fault) = (*good, fault);
         let (mut good_s, mut bad_s) = (good.t_s, bad_s);
         for _ in 0..60 {
             let middle_s = 0.5 * (good_s + bad_s);
             if (bad_s - good_s).abs() < 1e-6 {
                 break;
             }
-            if let Ok(state) = motion.teme(middle_s) {
-                good_s = middle_s;
-                let anomaly = self.clock.anomaly(middle_s);
-                edge = Node::new(middle_s, anomaly, motion.turned(&state, middle_s), state.r_teme_km);
-            } else {
-                bad_s = middle_s;
+            match motion.teme(middle_s) {
+                Ok(state) => {
+                    good_s = middle_s;
+                    edge = self.node(motion, middle_s, self.clock.anomaly(middle_s), &state);
+                }
+                Err(found) => {
+                    bad_s = middle_s;
+                    fault = found;
+                }
             }
         }
-        edge
+        (edge, fault)
     }
 
     /// Between the last node and the next, both with states, a low perigee may dip below the surface: finds out, and
     /// pushes the edges of the time without states.
     fn watch_for_decay(&self, motion: &mut Motion<'_>, block: &mut Block, next: &Node) {
         let Some(last) = block.nodes.last().copied() else { return };
-        let step = next.anomaly - last.anomaly;
-        let axis_km = (SGP4_MU_KM3_S2 / (self.clock.rate * self.clock.rate)).cbrt();
-        let dip_km = axis_km * self.clock.e * step * step / 8.0 + 5.0 * DECAY_WATCH_KM;
-        if last.radius_km.min(next.radius_km) > SGP4_EARTH_RADIUS_KM + dip_km {
+        if last.radius_km.min(next.radius_km) > SGP4_EARTH_RADIUS_KM + self.dip_km {
             return;
         }
         let piece = Piece::new(self.clock, &last, next);
@@ -311,11 +371,11 @@ impl Grid {
             }
         }
         if let Some((first_bad_s, fault)) = first_bad {
-            let down = self.edge(motion, &last, first_bad_s);
+            let (down, fault) = self.edge(motion, &last, first_bad_s, fault);
             if down.t_s > last.t_s {
                 block.push(down, Ok(()));
             }
-            let up = self.edge(motion, next, last_bad_s);
+            let (up, _) = self.edge(motion, next, last_bad_s, fault);
             block.push(up, Err(fault));
         }
     }

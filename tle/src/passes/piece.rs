@@ -49,7 +49,8 @@ pub(super) struct Clock {
 impl Clock {
     /// The time at an eccentric anomaly.
     pub(super) fn time_s(&self, anomaly: f64) -> f64 {
-        self.perigee_s + (anomaly - self.e * anomaly.sin()) / self.rate
+        let bend = if self.e == 0.0 { 0.0 } else { self.e * anomaly.sin() };
+        self.perigee_s + (anomaly - bend) / self.rate
     }
 
     /// The eccentric anomaly at a time: Newton inside a bracket that always holds it.
@@ -149,6 +150,21 @@ impl Piece {
     pub(super) fn position(&self, p: f64) -> Vec3 {
         let [c0, c1, c2, c3, c4, c5] = &self.coefficients;
         std::array::from_fn(|k| c0[k] + p * (c1[k] + p * (c2[k] + p * (c3[k] + p * (c4[k] + p * c5[k])))))
+    }
+
+    /// Position and its first derivative at p.
+    #[inline]
+    pub(super) fn path(&self, p: f64) -> (Vec3, Vec3) {
+        let [_, c1, c2, c3, c4, c5] = &self.coefficients;
+        let r1 = std::array::from_fn(|k| {
+            c1[k] + p * (2.0 * c2[k] + p * (3.0 * c3[k] + p * (4.0 * c4[k] + p * 5.0 * c5[k])))
+        });
+        (self.position(p), r1)
+    }
+
+    /// About how long the way is, km.
+    pub(super) fn length_km(&self) -> f64 {
+        crate::vector::norm(self.coefficients[1])
     }
 
     /// Position and derivatives at p.

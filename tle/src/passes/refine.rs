@@ -11,7 +11,7 @@ use super::sky::Sky;
 /// The two states about a summit are asked for this far from it, s.
 pub(super) const SUMMIT_OFFSET_S: f64 = 1.0;
 /// A crossing is settled when the next Newton step would move it by less than this, s.
-const SETTLED_S: f64 = 2e-7;
+const SETTLED_S: f64 = 5e-7;
 /// SGP4's velocity is not the derivative of its position: 8 cm/s off on round orbits, 2 m/s at low perigees of eccentric
 /// ones. As a part of the speed: so much of a Newton step is wrong.
 const VELOCITY_FLAW_ROUND: f64 = 1.5e-5;
@@ -33,7 +33,7 @@ pub(super) fn step_to_crossing(sky: &Sky<'_>, at: &Place, is_round: bool) -> (Pl
     let steepness = norm(at.state.v_ecef_km_s) / sight.clearance1.abs();
     let left = (0.5 * bend / sight.clearance1).abs() * dt * dt + flaw * steepness * dt.abs();
     // NaN and infinity settle nothing.
-    let settled = dt.abs() < 1.0 && left < SETTLED_S;
+    let settled = dt.abs() < 0.05 && left < SETTLED_S;
     let dt = if dt.is_finite() { dt.clamp(-60.0, 60.0) } else { 0.0 };
     (moved(at, dt, at.state.v_ecef_km_s), settled)
 }
@@ -51,26 +51,37 @@ fn moved(at: &Place, dt: f64, velocity: Vec3) -> Place {
     }
 }
 
-/// The crossing near a true state from which one Newton step did not settle it: more steps, then halving between the
-/// nearest times with opposite signs.
+/// The crossing near a true state from which one Newton step did not settle it: secants, which need no velocity, then
+/// halving.
 pub(super) fn crossing_from(
     sky: &Sky<'_>,
     motion: &mut Motion<'_>,
     first: &Place,
+    bracket: [f64; 2],
     rising: bool,
 ) -> Result<Place, PropagationError> {
-    let mut at = *first;
-    for _ in 0..8 {
-        let (next, settled) = step_to_crossing(sky, &at, motion.is_round());
-        if settled {
-            return Ok(next);
+    let mut before = *first;
+    let next_s = step_to_crossing(sky, first, motion.is_round()).0.t_s;
+    let mut at = Place { t_s: next_s, state: motion.at(next_s)? };
+    for _ in 0..12 {
+        let (clearance0, clearance) =
+            (sky.clearance(before.state.r_ecef_km), sky.clearance(at.state.r_ecef_km));
+        let last_s = at.t_s - before.t_s;
+        let dt = -clearance * last_s / (clearance - clearance0);
+        let (sight, bend) = sky.sight_of(&at.state);
+        let left = (bend / sight.clearance1 * dt * (dt + last_s)).abs();
+        if clearance == 0.0 || (dt.abs() < 0.02 && left < SETTLED_S) {
+            return Ok(moved(&at, if dt.is_finite() { dt } else { 0.0 }, at.state.v_ecef_km_s));
         }
-        if (next.t_s - first.t_s).abs() > 60.0 {
+        // A secant that leads far away has lost its root.
+        let next_s = at.t_s + dt;
+        if !(next_s > bracket[0] - 5.0 && next_s < bracket[1] + 5.0) {
             break;
         }
-        at = Place { t_s: next.t_s, state: motion.at(next.t_s)? };
+        before = at;
+        at = Place { t_s: next_s, state: motion.at(next_s)? };
     }
-    let t_s = crossing_between(sky, motion, first.t_s - 0.5, first.t_s + 0.5, rising);
+    let t_s = crossing_between(sky, motion, bracket[0], bracket[1], rising);
     Ok(Place { t_s, state: motion.at(t_s)? })
 }
 
@@ -87,14 +98,16 @@ pub(super) fn crossing_between(
     let mut value = |t_s: f64| motion.at(t_s).map_or(f64::NAN, |state| sign * sky.clearance(state.r_ecef_km));
     let (mut low_s, mut high_s) = (from_s, to_s);
     let (mut low, mut high) = (value(low_s), value(high_s));
+    // Each end moves out by ever larger steps, to twice the bracket's length and half a minute.
+    let widest_s = (to_s - from_s).abs() + 30.0;
     let mut widen_s = 0.01;
-    while low > 0.0 && widen_s < 100.0 {
+    while low > 0.0 && widen_s < widest_s {
         low_s -= widen_s;
         low = value(low_s);
         widen_s *= 2.0;
     }
     widen_s = 0.01;
-    while high <= 0.0 && widen_s < 100.0 {
+    while high <= 0.0 && widen_s < widest_s {
         high_s += widen_s;
         high = value(high_s);
         widen_s *= 2.0;

@@ -8,9 +8,10 @@ use super::piece::Piece;
 use super::refine::{crossing_between, summit};
 use super::sky::{Sight, Sky};
 
-/// Parts in which a piece is looked at for summits: enough for any orbit, as one part holds less than 10 degrees of
-/// anomaly.
-const PARTS: usize = 3;
+/// Parts in which a piece is looked at for summits. A summit and a valley within one part would both be missed: they are
+/// half a revolution apart on round low orbits, but shallow ones come close together on slow orbits.
+const PARTS_ROUND: usize = 1;
+const PARTS: usize = 8;
 /// How far a piece may be from SGP4, km, with a margin of five: measured 0.02 near Earth, 0.5 far out. A summit whose
 /// clearance is within twice that is computed by true SGP4 before anything is said about it.
 const PIECE_ERROR_KM: f64 = 0.1;
@@ -20,8 +21,8 @@ const PIECE_ERROR_PART: f64 = 2e-4;
 /// How a pass begins or ends, before it is refined.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Edge {
-    /// The threshold is crossed near this time.
-    Near(f64),
+    /// The threshold is crossed near this time, and between the two others.
+    Near(f64, [f64; 2]),
     /// The threshold is crossed at this time, already by true SGP4.
     At(f64),
     /// The window begins or ends.
@@ -139,14 +140,19 @@ impl<'a> Scan<'a> {
         };
         if above && self.open.is_none() {
             // Nothing can be above the threshold where the cells before were ruled out, unless there are none.
-            self.open = Some((edge.unwrap_or(Edge::Near(piece.time_s(0.0))), None, Vec::new()));
+            self.open = Some((
+                edge.unwrap_or(Edge::Near(piece.time_s(0.0), [piece.time_s(0.0); 2])),
+                None,
+                Vec::new(),
+            ));
         }
         let mut from = Point { p: 0.0, t_s: piece.time_s(0.0), above };
-        for part in 1..=PARTS {
-            let p = part as f64 / PARTS as f64;
+        let parts = if motion.is_round() { PARTS_ROUND } else { PARTS };
+        for part in 1..=parts {
+            let p = part as f64 / parts as f64;
             let sight = self.sight(piece, p);
             if (climb > 0.0) != (sight.climb > 0.0) {
-                let turn = self.turn(piece, from.p, p, climb > 0.0, motion);
+                let turn = self.turn(piece, [from.p, p], [climb, sight.climb], motion);
                 self.between(piece, from, turn, motion);
                 if climb > 0.0 && turn.above {
                     self.note_summit(turn.t_s);
@@ -162,17 +168,16 @@ impl<'a> Scan<'a> {
         self.carry = Some(Carry { cell: cell + 1, above, climb });
     }
 
-    /// The place between two parts' ends where the elevation turns.
-    fn turn(&self, piece: &Piece, from: f64, to: f64, is_summit: bool, motion: &mut Motion<'_>) -> Point {
-        let falling = if is_summit { 1.0 } else { -1.0 };
-        let p = root(from, to, |p| {
+    /// The place between two parts' ends, with these climbs, where the elevation turns.
+    fn turn(&self, piece: &Piece, ends: [f64; 2], climbs: [f64; 2], motion: &mut Motion<'_>) -> Point {
+        let falling = if climbs[0] > 0.0 { -1.0 } else { 1.0 };
+        let p = root(ends, climbs.map(|climb| falling * climb), |p| {
             let sight = self.sight(piece, p);
-            (-falling * sight.climb, -falling * sight.climb1)
+            (falling * sight.climb, falling * sight.climb1)
         });
-        let here = piece.motion(p);
-        let clearance = self.sky.clearance(here.r);
+        let clearance = self.clearance(piece, p);
         let t_s = piece.time_s(p);
-        let unsure = 2.0 * (PIECE_ERROR_KM + PIECE_ERROR_PART * crate::vector::norm(here.r1));
+        let unsure = 2.0 * (PIECE_ERROR_KM + PIECE_ERROR_PART * piece.length_km());
         if clearance.abs() > unsure {
             return Point { p, t_s, above: clearance > 0.0 };
         }
@@ -190,11 +195,12 @@ impl<'a> Scan<'a> {
         let rising = if to.above { 1.0 } else { -1.0 };
         let (low, high) = (self.clearance(piece, from.p) * rising, self.clearance(piece, to.p) * rising);
         let crossing = if low <= 0.0 && high > 0.0 {
-            let p = root(from.p, to.p, |p| {
-                let sight = self.sight(piece, p);
-                (rising * sight.clearance, rising * sight.clearance1)
+            let p = root([from.p, to.p], [low, high], |p| {
+                let (r, r1) = piece.path(p);
+                let (clearance, slope) = self.sky.clearance_and_slope(r, r1);
+                (rising * clearance, rising * slope)
             });
-            Edge::Near(piece.time_s(p))
+            Edge::Near(piece.time_s(p), [from.t_s, to.t_s])
         } else {
             // The piece does not show what SGP4 said of the summit.
             Edge::At(crossing_between(&self.sky, motion, from.t_s, to.t_s, to.above))
@@ -221,10 +227,15 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// The root of a function that grows through zero between two places: Newton, halving where that leaves the bracket.
-fn root(from: f64, to: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let (mut low, mut high) = (from, to);
-    let mut x = 0.5 * (low + high);
+/// A step by which a root no longer matters: Newton squares what is left, and true SGP4 has the last word.
+const ROOT_STEP: f64 = 2e-5;
+
+/// The root of a function that grows through zero between two places with known values: Newton from where the chord
+/// crosses, halving where that leaves the bracket.
+fn root(ends: [f64; 2], values: [f64; 2], value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let [mut low, mut high] = ends;
+    let chord = low - values[0] * (high - low) / (values[1] - values[0]);
+    let mut x = if chord > low && chord < high { chord } else { 0.5 * (low + high) };
     for _ in 0..50 {
         let (value, slope) = value_and_slope(x);
         if value > 0.0 {
@@ -232,10 +243,9 @@ fn root(from: f64, to: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 
         } else {
             low = x;
         }
-        let step = value / slope;
-        let next = x - step;
+        let next = x - value / slope;
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        if (next - x).abs() < 1e-9 || high - low < 1e-12 {
+        if (next - x).abs() < ROOT_STEP {
             return next;
         }
         x = next;
@@ -249,16 +259,9 @@ mod tests {
 
     #[test]
     fn root_is_found_on_flat_and_steep_curves() {
-        for (f, expected) in [
-            (Box::new(|x: f64| (x - 0.3, 1.0)) as Box<dyn Fn(f64) -> (f64, f64)>, 0.3),
-            (Box::new(|x: f64| ((x - 0.7).powi(3), 3.0 * (x - 0.7).powi(2))), 0.7),
-            (
-                Box::new(|x: f64| ((50.0 * (x - 0.11)).tanh(), 50.0 / (50.0 * (x - 0.11)).cosh().powi(2))),
-                0.11,
-            ),
-        ] {
-            let x = root(0.0, 1.0, f);
-            assert!((x - expected).abs() < 1e-6, "{x} {expected}");
-        }
+        let cubic = |x: f64| ((x - 0.7).powi(3) + 1e-3 * (x - 0.7), 3.0 * (x - 0.7).powi(2) + 1e-3);
+        let steep = |x: f64| ((50.0 * (x - 0.11)).tanh(), 50.0 / (50.0 * (x - 0.11)).cosh().powi(2));
+        assert!((root([0.0, 1.0], [cubic(0.0).0, cubic(1.0).0], cubic) - 0.7).abs() < 1e-5);
+        assert!((root([0.0, 1.0], [steep(0.0).0, steep(1.0).0], steep) - 0.11).abs() < 1e-5);
     }
 }

@@ -158,7 +158,7 @@ impl PassFinder {
             .map(|(mut scan, station)| {
                 scan.finish(stop_s);
                 let sky = *scan.sky();
-                let passes = settle(&sky, motion, &scan.drafts);
+                let passes = settle(&sky, motion, &scan.drafts, start_s, stop_s);
                 horizon::cut(station, min_elevation_deg, motion, passes)
             })
             .collect();
@@ -239,7 +239,13 @@ impl Gaps {
 }
 
 /// Turns drafts into passes: true states at all ends and summits at once, and one Newton step from each.
-fn settle(sky: &Sky<'_>, motion: &mut Motion<'_>, drafts: &[Draft]) -> Vec<RawPass> {
+fn settle(
+    sky: &Sky<'_>,
+    motion: &mut Motion<'_>,
+    drafts: &[Draft],
+    start_s: f64,
+    stop_s: f64,
+) -> Vec<RawPass> {
     let mut times = Vec::with_capacity(drafts.len() * 4);
     for draft in drafts {
         times.push(time_of(&draft.rise));
@@ -267,9 +273,13 @@ fn settle(sky: &Sky<'_>, motion: &mut Motion<'_>, drafts: &[Draft]) -> Vec<RawPa
         };
         let rise = settled_end(sky, motion, &draft.rise, rise, true, inwards_s);
         let fall = settled_end(sky, motion, &draft.fall, fall, false, inwards_s);
-        if let (Some(rise), Some(fall)) = (rise, fall)
-            && fall.place.t_s > rise.place.t_s
-        {
+        let (Some(mut rise), Some(mut fall)) = (rise, fall) else { continue };
+        // A crossing in the first or last moment of the window may step out of it.
+        rise.place.t_s = rise.place.t_s.max(start_s);
+        fall.place.t_s = fall.place.t_s.min(stop_s);
+        // Only where elements are nonsense, and the quintics with them, are passes found that SGP4 does not bear out.
+        let last_s = passes.last().map_or(start_s, |pass: &RawPass| pass.fall.place.t_s);
+        if rise.place.t_s >= last_s && fall.place.t_s > rise.place.t_s {
             summits.retain(|place| place.t_s >= rise.place.t_s && place.t_s <= fall.place.t_s);
             passes.push(RawPass { rise, fall, summits });
         }
@@ -279,7 +289,7 @@ fn settle(sky: &Sky<'_>, motion: &mut Motion<'_>, drafts: &[Draft]) -> Vec<RawPa
 
 const fn time_of(edge: &Edge) -> f64 {
     match *edge {
-        Edge::Near(t_s) | Edge::At(t_s) | Edge::Window(t_s) | Edge::Lost(t_s, _) => t_s,
+        Edge::Near(t_s, _) | Edge::At(t_s) | Edge::Window(t_s) | Edge::Lost(t_s, _) => t_s,
     }
 }
 
@@ -310,12 +320,12 @@ fn settled_end(
     };
     let place = Place { t_s, state };
     let (place, cause) = match *edge {
-        Edge::Near(_) => {
+        Edge::Near(_, bracket) => {
             let (next, settled) = step_to_crossing(sky, &place, motion.is_round());
             if settled {
                 (next, EndCause::Horizon)
             } else {
-                (crossing_from(sky, motion, &place, rising).ok()?, EndCause::Horizon)
+                (crossing_from(sky, motion, &place, bracket, rising).ok()?, EndCause::Horizon)
             }
         }
         Edge::At(_) => (place, EndCause::Horizon),

@@ -46,6 +46,15 @@ impl<'a> Sky<'a> {
         }
     }
 
+    /// The clearance of a position, and its derivative by the parameter of `r1`.
+    #[inline]
+    pub(super) fn clearance_and_slope(&self, r: Vec3, r1: Vec3) -> (f64, f64) {
+        let d = sub(r, self.axes.r_ecef_km);
+        let up = self.axes.up;
+        let range = norm(d).max(1e-9);
+        (dot(d, up) - range * self.sin_threshold, dot(r1, up) - dot(d, r1) / range * self.sin_threshold)
+    }
+
     /// The clearance of a position, km.
     pub(super) fn clearance(&self, r: Vec3) -> f64 {
         let d = sub(r, self.axes.r_ecef_km);
