@@ -24,7 +24,9 @@ EVERY = 10
 def satellites(path):
     for fields in json.loads(path.read_text()):
         satrec = Satrec()
-        omm.initialize(satrec, {key: str(value) for key, value in fields.items()})
+        # No launch has a designator here, and python sgp4 wants one.
+        text = {"OBJECT_ID": "2026-001A"} | {key: str(value) for key, value in fields.items()}
+        omm.initialize(satrec, text)
         yield satrec
 
 
