@@ -2,13 +2,14 @@
 //!
 //! | module | what |
 //! | --- | --- |
-//! | [`Time`] | RFC 3339 in UTC with milliseconds, the only form of a time on the wire |
+//! | [`Time`] | RFC 3339 in UTC with milliseconds, the form of a time on the wire (orbits: [`FineTime`]) |
 //! | [`Version`], [`Health`] | the handshake: who is there, what it can, whether it is well |
 //! | [`StationView`] | how the station is right now |
 //! | [`FrameView`], [`TelemetryPage`], [`EventView`], [`AuditView`] | what was heard, the values in it, what happened, who did what |
 //! | [`CommandRequest`], [`CommandView`] | telecommands: asked for, and on their way |
 //! | [`telecommand`] | every telecommand of the ICD to JSON and back, with errors that name the field |
 //! | [`ImageView`], [`ChunkMap`], [`DownloadView`] | pictures and the orders to bring them home |
+//! | [`PassView`], [`LookView`], [`ElementsView`] | what is in the sky, with [`FineTime`] to the microsecond |
 //! | [`StreamMessage`] | what the WebSocket says |
 //! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
 //!
@@ -25,6 +26,7 @@ mod frame;
 mod image;
 mod page;
 mod problem;
+mod sky;
 mod station;
 mod stream;
 pub mod telecommand;
@@ -39,6 +41,7 @@ pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
 pub use image::{ChunkMap, ImageView};
 pub use page::{Nothing, Page};
 pub use problem::{FieldError, Problem, ProblemKind};
+pub use sky::{ElementsView, FineTime, LookView, PassEndWord, PassView, RefusedElements, SkyGapView};
 pub use station::{ImageProgress, LinkView, SatelliteView, SealingView, StationView, StorageView};
 pub use stream::StreamMessage;
 pub use telecommand::ArgumentError;

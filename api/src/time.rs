@@ -1,4 +1,4 @@
-//! The only form of a time on the wire.
+//! The form of a time on the wire.
 
 use std::fmt;
 use std::str::FromStr;
@@ -29,6 +29,12 @@ impl Time {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TimeError(String);
 
+impl TimeError {
+    pub(crate) fn of(text: &str) -> Self {
+        Self(text.chars().take(40).collect())
+    }
+}
+
 impl fmt::Display for TimeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "'{}' is no time: write it as RFC 3339, e.g. 2026-11-22T05:19:25.123Z", self.0)
@@ -41,7 +47,7 @@ impl FromStr for Time {
     type Err = TimeError;
 
     fn from_str(text: &str) -> Result<Self, TimeError> {
-        text.parse().map(Self).map_err(|_| TimeError(text.chars().take(40).collect()))
+        text.parse().map(Self).map_err(|_| TimeError::of(text))
     }
 }
 
