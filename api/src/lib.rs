@@ -10,6 +10,7 @@
 //! | [`telecommand`] | every telecommand of the ICD to JSON and back, with errors that name the field |
 //! | [`ImageView`], [`ChunkMap`], [`DownloadView`] | pictures and the orders to bring them home |
 //! | [`PassView`], [`LookView`], [`ElementsView`] | what is in the sky, with [`FineTime`] to the microsecond |
+//! | [`ElementsRequest`], [`HeldElements`], [`FetchReport`] | elements: given, held, fetched |
 //! | [`StreamMessage`] | what the WebSocket says |
 //! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
 //!
@@ -21,6 +22,7 @@
 
 mod command;
 mod download;
+mod elements;
 mod event;
 mod frame;
 mod image;
@@ -36,6 +38,10 @@ mod version;
 
 pub use command::{CommandRequest, CommandView, GateWord, Outcome, OutcomeWord, StageView};
 pub use download::{DownloadRequest, DownloadView};
+pub use elements::{
+    ElementsAdded, ElementsRequest, ElementsSource, FetchReport, FetchWord, HeldElements, SourceFetched,
+    SourceWord,
+};
 pub use event::{AuditView, EventView, LimitView};
 pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
 pub use image::{ChunkMap, ImageView};
