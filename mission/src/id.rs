@@ -79,6 +79,10 @@ name!(
     /// One way to the radio: a serial port, a TCP connection, a replayed file.
     LinkId
 );
+name!(
+    /// A plan for passes.
+    PlanName
+);
 
 macro_rules! number {
     ($(#[$meta:meta])* $type:ident) => {

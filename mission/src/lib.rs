@@ -19,6 +19,7 @@ pub mod id;
 pub mod intent;
 pub mod level;
 pub mod limits;
+pub mod plan;
 pub mod port;
 pub mod record;
 pub mod snapshot;
@@ -31,8 +32,8 @@ pub use clock::{Clock, MonoUs, Now, UtcUs};
 pub use config::{CounterRule, LinkConfig, Profile, SatelliteConfig, StationConfig};
 pub use cover::{Cost, Cover, Range, cheapest_cover};
 pub use id::{
-    BatchId, CommandId, DownloadId, FrameId, ImageId, IntentId, LinkId, Principal, SatelliteId, StationId,
-    TxId,
+    BatchId, CommandId, DownloadId, FrameId, ImageId, IntentId, LinkId, PlanName, Principal, SatelliteId,
+    StationId, TxId,
 };
 pub use intent::{Accepted, CommandIntent, Intent, IntentEnvelope, IntentReceipt, Refusal};
 pub use level::Level;

@@ -1,8 +1,24 @@
 //! Values out of a packet: one place, for live frames and for `redecode` alike.
 
-use protocol::{Downlink, FieldValue};
+use std::collections::BTreeSet;
+
+use protocol::{DOWN_PAYLOAD_MAX, Downlink, FieldValue};
 
 use crate::record::Point;
+
+/// The names of all values that any packet can bring.
+pub fn known_parameters() -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for packet_type in 0..=u8::MAX {
+        // Lists (events) have as many entries as their first byte says.
+        let payload = [0; DOWN_PAYLOAD_MAX];
+        let packet = (0..=payload.len()).find_map(|len| Downlink::decode(packet_type, &payload[..len]).ok());
+        if let Some(packet) = packet {
+            names.extend(points(&packet).into_iter().map(|point| point.parameter));
+        }
+    }
+    names
+}
 
 /// The values of a packet, named `packet.field`. Chunks and packets without fields give none.
 ///
