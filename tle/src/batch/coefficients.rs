@@ -5,14 +5,14 @@ use std::f64::consts::{PI, TAU};
 use crate::elements::Elements;
 use crate::propagator::{DEEP_SPACE_PERIOD_MIN, SGP4_EARTH_RADIUS_KM};
 
-/// The kernel takes orbits with a smaller eccentricity than this; its solution of Kepler's equation relies on it.
+/// Orbits with a smaller eccentricity than this are round: Kepler's equation takes two short steps for them.
 pub const ECCENTRICITY_BOUND: f64 = 0.02;
 
 /// Square root of the gravitational parameter (WGS72), Earth radii^1.5 / min.
 pub(super) const KE: f64 = 0.074_366_916_133_173_42;
 /// Zonal harmonics of WGS72.
 pub(super) const J2: f64 = 0.001_082_616;
-const J3: f64 = -0.000_002_538_81;
+pub(super) const J3: f64 = -0.000_002_538_81;
 const J4: f64 = -0.000_001_655_97;
 
 /// SGP4's constants of one object (`T` is a number), of as many as the machine has lanes, or of a fleet (columns).
@@ -100,7 +100,8 @@ impl<T> Coefficients<T> {
 }
 
 impl Coefficients<f64> {
-    /// From mean elements. `None` for orbits that the kernel does not take: deep space, eccentric, or none at all.
+    /// From mean elements: all that near-earth orbits need, and what deep space shares with them. `None` where they describe
+    /// no closed orbit.
     ///
     /// Spacetrack Report No. 3 and AIAA 2006-6753, `sgp4init`.
     pub(super) fn new(elements: &Elements) -> Option<Self> {
@@ -114,8 +115,7 @@ impl Coefficients<f64> {
             elements.bstar,
             kozai,
         ];
-        if !(0.0..ECCENTRICITY_BOUND).contains(&ecco) || kozai <= 0.0 || finite.iter().any(|x| !x.is_finite())
-        {
+        if !(0.0..1.0).contains(&ecco) || kozai <= 0.0 || finite.iter().any(|x| !x.is_finite()) {
             return None;
         }
         let (sinio, cosio) = elements.inclination_deg.to_radians().sin_cos();
@@ -132,7 +132,7 @@ impl Coefficients<f64> {
         let del = p / (a1 * a1);
         let adel = a1 * (1.0 - del * del - del * (1.0 / 3.0 + 134.0 * del * del / 81.0));
         let no = kozai / (1.0 + p / (adel * adel));
-        if no.is_nan() || no <= TAU / DEEP_SPACE_PERIOD_MIN {
+        if no.is_nan() || no <= 0.0 {
             return None;
         }
 
@@ -206,7 +206,7 @@ impl Coefficients<f64> {
             x7thm1: 7.0 * cosio2 - 1.0,
             ..Self::default()
         };
-        if perigee_km >= 220.0 {
+        if perigee_km >= 220.0 && !set.is_deep_space() {
             let cc1sq = cc1 * cc1;
             set.cc5 = 2.0 * bstar * coef1 * ao * omeosq * (1.0 + 2.75 * (etasq + eeta) + eeta * etasq);
             set.d2 = 4.0 * ao * tsi * cc1sq;
@@ -227,6 +227,16 @@ impl Coefficients<f64> {
             }
         }
         Some(set)
+    }
+
+    /// Whether the deep-space part of the theory is at work.
+    pub(super) fn is_deep_space(&self) -> bool {
+        self.no <= TAU / DEEP_SPACE_PERIOD_MIN
+    }
+
+    /// Whether the kernel for round orbits will do.
+    pub(super) fn is_round(&self) -> bool {
+        self.ecco < ECCENTRICITY_BOUND
     }
 }
 

@@ -1,5 +1,7 @@
 //! States as columns: what the kernel writes and the pass search reads.
 
+use fearless_simd::{Simd, prelude::*};
+
 /// Positions and velocities in TEME, one number of each state per column. A state without an answer is NaN throughout.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct StateColumns {
@@ -45,15 +47,14 @@ impl StateColumns {
         }
     }
 
-    /// The six columns from `from` to `to`.
-    pub(super) fn window(&mut self, from: usize, to: usize) -> [&mut [f64]; 6] {
-        [
-            &mut self.x[from..to],
-            &mut self.y[from..to],
-            &mut self.z[from..to],
-            &mut self.vx[from..to],
-            &mut self.vy[from..to],
-            &mut self.vz[from..to],
-        ]
+    /// Writes lanes from one place on, as far as there is room; the place after them.
+    #[inline(always)]
+    pub(super) fn put<S: Simd>(&mut self, from: usize, state: [S::f64s; 6]) -> usize {
+        let to = (from + S::f64s::LEN).min(self.len());
+        let columns = [&mut self.x, &mut self.y, &mut self.z, &mut self.vx, &mut self.vy, &mut self.vz];
+        for (column, value) in columns.into_iter().zip(state) {
+            column[from..to].copy_from_slice(&value.as_slice()[..to - from]);
+        }
+        to
     }
 }

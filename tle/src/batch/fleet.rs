@@ -1,10 +1,11 @@
 //! Many objects at one instant each: a sky full of them, redrawn.
 
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{Level, Simd, dispatch};
 
 use super::coefficients::Coefficients;
 use super::columns::StateColumns;
 use super::kernel;
+use super::near_earth::lanes_from;
 use crate::elements::Elements;
 use crate::time::UtcInstant;
 
@@ -29,10 +30,11 @@ impl Fleet {
         }
     }
 
-    /// Takes an object in as the last one. False, and nothing taken, for an object the kernel does not take (see
-    /// [`NearEarth::new`](super::NearEarth::new)).
+    /// Takes an object in as the last one. False, and nothing taken, for a period of 225 minutes or more and an eccentricity
+    /// of [`ECCENTRICITY_BOUND`](super::ECCENTRICITY_BOUND) or more.
     pub fn push(&mut self, elements: &Elements) -> bool {
-        let Some(set) = Coefficients::new(elements) else { return false };
+        let round = |set: &Coefficients<f64>| set.is_round() && !set.is_deep_space();
+        let Some(set) = Coefficients::new(elements).filter(round) else { return false };
         self.columns.push(&set);
         self.epochs.push(elements.epoch);
         true
@@ -67,24 +69,10 @@ impl Default for Fleet {
 
 #[inline(always)]
 fn propagate<S: Simd>(simd: S, columns: &Coefficients<Vec<f64>>, minutes: &[f64], states: &mut StateColumns) {
-    let lanes = S::f64s::LEN;
     let mut from = 0;
     while from < minutes.len() {
-        let to = (from + lanes).min(minutes.len());
-        let cut = |column: &[f64]| {
-            if to - from == lanes {
-                S::f64s::from_slice(simd, &column[from..to])
-            } else {
-                // The last few: the idle lanes repeat the last object, so that none of them traps or stalls.
-                let mut value = S::f64s::splat(simd, column[to - 1]);
-                value.as_mut_slice()[..to - from].copy_from_slice(&column[from..to]);
-                value
-            }
-        };
-        let state = kernel::propagate(simd, &columns.map(|column| cut(column)), cut(minutes));
-        for (column, value) in states.window(from, to).into_iter().zip(state) {
-            column.copy_from_slice(&value.as_slice()[..to - from]);
-        }
-        from = to;
+        let set = columns.map(|column| lanes_from(simd, column, from));
+        let state = kernel::propagate::<S, true>(simd, &set, lanes_from(simd, minutes, from));
+        from = states.put::<S>(from, state);
     }
 }

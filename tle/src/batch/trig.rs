@@ -65,7 +65,7 @@ pub(super) fn sin_cos<S: Simd>(simd: S, x: S::f64s) -> (S::f64s, S::f64s) {
 
 /// Sine and cosine of an angle within pi/2.
 #[inline(always)]
-fn within_half_turn<S: Simd>(simd: S, r: S::f64s) -> (S::f64s, S::f64s) {
+pub(super) fn within_half_turn<S: Simd>(simd: S, r: S::f64s) -> (S::f64s, S::f64s) {
     let r2 = r * r;
     let sin = (r2 * r).mul_add(polynomial(simd, r2, SIN), r);
     let cos = r2.mul_add(polynomial(simd, r2, COS), S::f64s::splat(simd, 1.0));

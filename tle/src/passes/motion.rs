@@ -67,9 +67,9 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Whether the orbit is near the Earth and nearly circular, so that lanes compute it and its velocities are good.
-    pub(super) const fn is_round(&self) -> bool {
-        self.lanes.is_some()
+    /// Whether the orbit is near the Earth and nearly circular, so that its velocities are good.
+    pub(super) fn is_round(&self) -> bool {
+        self.lanes.is_some_and(NearEarth::is_round)
     }
 
     /// Seconds from the epoch of the elements to the origin.
