@@ -48,7 +48,9 @@ pub use image::{ChunkMap, ImageView};
 pub use page::{Nothing, Page};
 pub use problem::{FieldError, Problem, ProblemKind};
 pub use sky::{ElementsView, FineTime, LookView, PassEndWord, PassView, RefusedElements, SkyGapView};
-pub use station::{ImageProgress, LinkView, SatelliteView, SealingView, StationView, StorageView};
+pub use station::{
+    ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView,
+};
 pub use stream::StreamMessage;
 pub use telecommand::ArgumentError;
 pub use telemetry::{Bucket, LatestValue, ParameterView, Sample, TelemetryPage};

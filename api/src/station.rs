@@ -46,6 +46,15 @@ pub struct SatelliteView {
     pub in_view: Option<bool>,
     /// Loss of signal, when known.
     pub los_at: Option<Time>,
+    /// What may be expected of it now, as a short sentence: `no contact expected until 14:32Z`.
+    #[serde(default)]
+    pub expectation: String,
+    /// The elements in use; `null` without elements or without the station's place.
+    #[serde(default)]
+    pub elements: Option<ElementsInUse>,
+    /// The pass that lasts and those of the next two days, in order of time.
+    #[serde(default)]
+    pub next_passes: Vec<NextPass>,
     /// What the uplink is doing, as a short sentence.
     pub uplink: String,
     /// The command on its way.
@@ -56,6 +65,40 @@ pub struct SatelliteView {
     pub image: Option<ImageProgress>,
     /// The active download.
     pub download: Option<u64>,
+}
+
+/// The elements that say where a satellite is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ElementsInUse {
+    /// Their number in the archive.
+    pub id: u64,
+    /// Their epoch.
+    pub epoch: Time,
+    /// Days since the epoch; negative before it.
+    pub age_days: f64,
+    /// Expected error of AOS and LOS, s (a rule of thumb).
+    pub timing_error_s: f64,
+    /// `normal`, `watch`, `warning`, or `distress` when they say nothing any more.
+    pub level: String,
+    /// Why they tell no passes, as a sentence.
+    pub fault: Option<String>,
+}
+
+/// A pass in short; `/passes` tells more.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NextPass {
+    /// Acquisition of signal.
+    pub aos: Time,
+    /// Greatest elevation.
+    pub tca: Time,
+    /// Loss of signal; `null` for an object that does not set.
+    pub los: Option<Time>,
+    /// Elevation at TCA, degrees.
+    pub max_elevation_deg: f64,
+    /// Azimuths at AOS, TCA and LOS, degrees from north over east.
+    pub azimuths_deg: [f64; 3],
+    /// The elements it was computed from.
+    pub elements: u64,
 }
 
 /// How far an image is.

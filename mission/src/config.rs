@@ -5,6 +5,7 @@ use radio::airtime::LinkTiming;
 
 use crate::id::{LinkId, SatelliteId, StationId};
 use crate::limits::LimitRule;
+use crate::sky::Site;
 
 /// A station with its satellites and links.
 #[derive(Debug, Clone)]
@@ -15,6 +16,8 @@ pub struct StationConfig {
     pub satellites: Vec<SatelliteConfig>,
     /// The ways to its radios.
     pub links: Vec<LinkConfig>,
+    /// Where it stands; without it no pass is known.
+    pub site: Option<Site>,
 }
 
 /// A satellite: its profile, its key, its limits.

@@ -83,6 +83,10 @@ name!(
     /// A plan for passes.
     PlanName
 );
+name!(
+    /// An antenna of a ground station, with its rotator if it has one.
+    AntennaId
+);
 
 macro_rules! number {
     ($(#[$meta:meta])* $type:ident) => {
@@ -113,6 +117,14 @@ number!(
 number!(
     /// A standing order to bring an image home, from 1, rising.
     DownloadId
+);
+number!(
+    /// A set of mean elements of one satellite, from 1, rising in the order in which they were added.
+    ElementsId
+);
+number!(
+    /// A pass of a satellite over our station, from 1, rising.
+    PassId
 );
 number!(
     /// A batch of records that is stored whole or not at all; numbered within one life of the process.

@@ -42,6 +42,15 @@ pub enum Intent {
     VouchClock,
     /// I know why counter and witness disagree: go on above the higher of them.
     ConfirmCounter(KeyId),
+    /// Use these elements from now on, where they are the best for an instant. Sets that are held already are skipped.
+    AddElements {
+        /// Whose.
+        satellite: SatelliteId,
+        /// At most [`crate::sky::SETS_AT_ONCE`].
+        elements: Vec<tle::Elements>,
+        /// Where they came from, for people; no secrets.
+        source: String,
+    },
     /// Let a link transmit, or not.
     ArmLink {
         /// Which.

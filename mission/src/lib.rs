@@ -10,7 +10,7 @@
 //!   and `radiating` stage were confirmed durable;
 //! - *durable before told*: a [`Effect::Reply`] follows the confirmation of the batch that holds what it tells.
 //!
-//! What it does **not** do: read a clock, open a port, know SQL or HTTP, find passes.
+//! What it does **not** do: read a clock, open a port, know SQL or HTTP.
 
 pub mod clock;
 pub mod config;
@@ -20,8 +20,11 @@ pub mod intent;
 pub mod level;
 pub mod limits;
 pub mod plan;
+pub mod pointing;
 pub mod port;
 pub mod record;
+pub mod schedule;
+pub mod sky;
 pub mod snapshot;
 pub mod stage;
 mod station;
@@ -32,14 +35,15 @@ pub use clock::{Clock, MonoUs, Now, UtcUs};
 pub use config::{CounterRule, LinkConfig, Profile, SatelliteConfig, StationConfig};
 pub use cover::{Cost, Cover, Range, cheapest_cover};
 pub use id::{
-    BatchId, CommandId, DownloadId, FrameId, ImageId, IntentId, LinkId, PlanName, Principal, SatelliteId,
-    StationId, TxId,
+    AntennaId, BatchId, CommandId, DownloadId, ElementsId, FrameId, ImageId, IntentId, LinkId, PassId,
+    PlanName, Principal, SatelliteId, StationId, TxId,
 };
 pub use intent::{Accepted, CommandIntent, Intent, IntentEnvelope, IntentReceipt, Refusal};
 pub use level::Level;
 pub use limits::{LimitRule, LimitState};
 pub use port::{Effect, Input, LinkState, MaybeRadiated, ReservedFrame, Transmit};
 pub use record::{Batch, Gate, Record, Source};
+pub use sky::{ElementSet, PassAhead, Site};
 pub use snapshot::Snapshot;
 pub use stage::Stage;
 pub use station::{Entropy, Station};

@@ -3,11 +3,14 @@
 //! A [`Batch`] is stored whole or not at all, in the order of its records. Storage decides nothing; it assigns the
 //! one durable sequence of events when it commits.
 
+use std::sync::Arc;
+
 use protocol::{Counter, FrameForm, KeyId, Nonce, RequestTag};
 
 use crate::clock::UtcUs;
 use crate::id::{
-    BatchId, CommandId, DownloadId, FrameId, ImageId, LinkId, Principal, SatelliteId, StationId,
+    BatchId, CommandId, DownloadId, ElementsId, FrameId, ImageId, LinkId, PassId, Principal, SatelliteId,
+    StationId,
 };
 use crate::intent::IntentReceipt;
 use crate::level::Level;
@@ -65,6 +68,10 @@ pub enum Record {
     Download(DownloadRecord),
     /// The state of a limit, inserted or brought up to date.
     Limit(LimitRecord),
+    /// A set of mean elements, new.
+    Elements(ElementsRecord),
+    /// A pass that began, got new elements or ended: inserted or brought up to date.
+    Pass(PassRecord),
     /// Something to tell. Gets its place in the one durable sequence at the commit.
     Event(EventRecord),
     /// Who did what.
@@ -379,6 +386,52 @@ pub struct LimitRecord {
     pub value: Option<f64>,
 }
 
+/// A set of mean elements of one satellite. Kept for ever: what a pass used can be looked up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElementsRecord {
+    /// New id.
+    pub id: ElementsId,
+    /// Whose.
+    pub satellite: SatelliteId,
+    /// The station that keeps them.
+    pub station: StationId,
+    /// Where they came from: a file's name, a source's name, `prelaunch`. No secrets.
+    pub source: String,
+    /// When they were added.
+    pub added_at: UtcUs,
+    /// Who added them.
+    pub who: Principal,
+    /// The elements, with every field of their message.
+    pub elements: Arc<tle::Elements>,
+}
+
+/// A pass of a satellite over our station, as the elements told it when it was near.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PassRecord {
+    /// Id, kept over updates.
+    pub id: PassId,
+    /// Who passes.
+    pub satellite: SatelliteId,
+    /// Over which station.
+    pub station: StationId,
+    /// Acquisition of signal: above the station's horizon from here on.
+    pub aos_at: UtcUs,
+    /// Greatest elevation.
+    pub tca_at: UtcUs,
+    /// Loss of signal; `None` for an object that does not set.
+    pub los_at: Option<UtcUs>,
+    /// Elevation at TCA, degrees.
+    pub max_elevation_deg: f64,
+    /// The elements it was computed from and since when they were in use, oldest first: more than one when new ones
+    /// arrived in mid-pass. At most [`PASS_ELEMENTS_MAX`], then the first and the newest ones.
+    pub elements: Vec<(ElementsId, UtcUs)>,
+    /// When it ended; `None` while it lasts.
+    pub ended_at: Option<UtcUs>,
+}
+
+/// Element sets that one pass remembers.
+pub const PASS_ELEMENTS_MAX: usize = 16;
+
 /// Something to tell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EventRecord {
@@ -442,6 +495,10 @@ pub enum EventKind {
     Link,
     /// The satellite was heard after silence, or fell silent.
     Contact,
+    /// A pass began or ended, or its beacon is overdue.
+    Pass,
+    /// Elements were added, are getting old, or tell nothing.
+    Elements,
     /// Sealing was locked, unlocked, or its clock is in doubt.
     Sealing,
     /// Storage failed or recovered.
@@ -452,7 +509,7 @@ pub enum EventKind {
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::FrameHeard,
         Self::CommandStage,
         Self::ImageDeclared,
@@ -465,6 +522,8 @@ impl EventKind {
         Self::SatelliteError,
         Self::Link,
         Self::Contact,
+        Self::Pass,
+        Self::Elements,
         Self::Sealing,
         Self::Storage,
         Self::Station,
@@ -485,6 +544,8 @@ impl EventKind {
             Self::SatelliteError => "satellite-error",
             Self::Link => "link",
             Self::Contact => "contact",
+            Self::Pass => "pass",
+            Self::Elements => "elements",
             Self::Sealing => "sealing",
             Self::Storage => "storage",
             Self::Station => "station",

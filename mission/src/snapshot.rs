@@ -6,7 +6,8 @@ use protocol::{Counter, KeyId, RequestTag};
 
 use crate::clock::UtcUs;
 use crate::id::{FrameId, SatelliteId};
-use crate::record::{CommandRecord, DownloadRecord, ImageRecord, LimitRecord};
+use crate::record::{CommandRecord, DownloadRecord, ImageRecord, LimitRecord, PassRecord};
+use crate::sky::ElementSet;
 use crate::stage::Stage;
 
 /// Everything at once.
@@ -31,6 +32,10 @@ pub struct LastIds {
     pub image: u64,
     /// Of downloads.
     pub download: u64,
+    /// Of element sets.
+    pub elements: u64,
+    /// Of passes.
+    pub pass: u64,
 }
 
 /// What one satellite left.
@@ -50,6 +55,10 @@ pub struct SatelliteSnapshot {
     pub limits: Vec<LimitRecord>,
     /// The newest heartbeat: frame, when heard, uptime in ms.
     pub heartbeat: Option<(FrameId, UtcUs, u32)>,
+    /// Its element sets: the newest [`crate::sky::SETS_KEPT`] by epoch, in any order.
+    pub elements: Vec<ElementSet>,
+    /// The newest pass over this station that has not ended.
+    pub pass: Option<PassRecord>,
 }
 
 /// A command that is not over.

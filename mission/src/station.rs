@@ -5,6 +5,7 @@
 //! | `journal` | what is to be made durable, in order, and what waits for it |
 //! | `sealing` | which counter a frame may be sealed with |
 //! | `contact` | when the satellite was heard, and when it transmits by itself |
+//! | `sky` | elements and passes: whether the satellite is in view |
 //! | `link`, `satellite` | what is known of each |
 //! | `intake` | bytes to frames, frames to records |
 //! | `packets` | what a packet changes |
@@ -32,6 +33,7 @@ mod packets;
 mod restore;
 mod satellite;
 mod sealing;
+mod sky;
 mod uplink;
 mod view;
 mod wanted;
@@ -47,6 +49,7 @@ use crate::id::{FrameId, LinkId, Principal, SatelliteId, StationId};
 use crate::level::Level;
 use crate::port::{Effect, Input, LinkState};
 use crate::record::{AuditRecord, EventKind, EventRecord, Record, Route, Subject};
+use crate::sky::Site;
 use crate::snapshot::{LastIds, Snapshot};
 use crate::status::Status;
 
@@ -78,6 +81,7 @@ pub struct Station {
     effects: VecDeque<Effect>,
     satellites: Vec<Satellite>,
     links: Vec<Link>,
+    site: Option<Site>,
     ids: LastIds,
     last_tx: u64,
     recent: VecDeque<Recent>,
@@ -165,6 +169,7 @@ impl Station {
         for s in 0..self.satellites.len() {
             self.satellites[s].wake = None;
             self.unlock_step(s);
+            self.sky_step(now, s);
             self.note_contact(now, s);
             self.expire(now, s);
             self.settle_overdue(now, s);

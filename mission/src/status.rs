@@ -5,6 +5,7 @@ use protocol::KeyId;
 use crate::clock::{Now, UtcUs};
 use crate::id::{CommandId, DownloadId, ImageId, LinkId, SatelliteId, StationId};
 use crate::port::LinkState;
+use crate::sky::{ElementSet, ElementsAge, PassAhead};
 
 /// The station now.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +68,10 @@ pub struct SatelliteStatus {
     pub in_view: Option<bool>,
     /// Loss of signal, when known.
     pub los_at: Option<UtcUs>,
+    /// What may be expected of it now, as a short sentence: `no contact expected until 14:32Z`.
+    pub expectation: String,
+    /// What its elements say; `None` without elements or without the station's place.
+    pub sky: Option<SkyStatus>,
     /// What the uplink is doing, as a short sentence: why nothing is sent, or what is awaited until when.
     pub uplink: String,
     /// The command that is on its way or awaits its answer.
@@ -77,6 +82,19 @@ pub struct SatelliteStatus {
     pub image: Option<ImageStatus>,
     /// The active download.
     pub download: Option<DownloadId>,
+}
+
+/// A satellite in the sky of the station.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkyStatus {
+    /// The elements in use.
+    pub elements: ElementSet,
+    /// How old they are and what that costs.
+    pub age: ElementsAge,
+    /// Why they tell nothing at present, as a sentence.
+    pub fault: Option<String>,
+    /// The pass that lasts (first, if one does) and those to come, in order of time; at most [`crate::sky::PASSES_TOLD`].
+    pub passes: Vec<PassAhead>,
 }
 
 /// The newest image.

@@ -40,6 +40,7 @@ fn station(links: &[(&str, &str)]) -> Station {
     });
     let config = StationConfig {
         station: StationId::new("home").expect("a name"),
+        site: None,
         satellites: satellites.collect(),
         links: links
             .iter()

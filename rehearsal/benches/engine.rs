@@ -162,6 +162,7 @@ impl Ground {
         let link = LinkId::new("radio").expect("a legal name");
         let config = StationConfig {
             station: StationId::new("home").expect("a legal name"),
+            site: None,
             satellites: vec![SatelliteConfig {
                 id: satellite.clone(),
                 profile: Profile::default(),

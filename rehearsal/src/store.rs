@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use mission::record::{
-    CommandRecord, DownloadRecord, DownloadState, ImageRecord, LimitRecord, Record, SealedRecord,
+    CommandRecord, DownloadRecord, DownloadState, ImageRecord, LimitRecord, PassRecord, Record, SealedRecord,
 };
 use mission::snapshot::{
     CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot, Snapshot,
     Witness,
 };
-use mission::{Batch, CommandId, DownloadId, FrameId, ImageId, SatelliteId, Stage, UtcUs};
+use mission::{Batch, CommandId, DownloadId, ElementSet, FrameId, ImageId, PassId, SatelliteId, Stage, UtcUs};
 use protocol::{Counter, Downlink, KeyId, RequestTag};
 
 /// A command with its last stage.
@@ -40,6 +40,8 @@ pub(crate) struct Store {
     downloads: BTreeMap<DownloadId, DownloadRecord>,
     limits: BTreeMap<String, LimitRecord>,
     heartbeat: Option<(FrameId, UtcUs, u32)>,
+    elements: Vec<ElementSet>,
+    pub(crate) passes: BTreeMap<PassId, PassRecord>,
     /// Final stages reached, by word.
     pub(crate) finals: BTreeMap<&'static str, u64>,
     pub(crate) frames: u64,
@@ -143,6 +145,14 @@ impl Store {
             Record::Limit(limit) => {
                 self.limits.insert(limit.parameter.clone(), limit.clone());
             }
+            Record::Elements(set) => {
+                self.last_ids.elements = self.last_ids.elements.max(set.id.0);
+                self.elements.push(ElementSet { id: set.id, elements: Arc::clone(&set.elements) });
+            }
+            Record::Pass(pass) => {
+                self.last_ids.pass = self.last_ids.pass.max(pass.id.0);
+                self.passes.insert(pass.id, pass.clone());
+            }
             Record::Event(event) => {
                 self.events += 1;
                 self.bridges += u64::from(event.kind == mission::record::EventKind::Bridge);
@@ -183,6 +193,8 @@ impl Store {
                 downloads: self.downloads.values().filter(active).cloned().collect(),
                 limits: self.limits.values().cloned().collect(),
                 heartbeat: self.heartbeat,
+                elements: self.elements.clone(),
+                pass: self.passes.values().rev().find(|pass| pass.ended_at.is_none()).cloned(),
             }],
             keys: vec![KeySnapshot {
                 key,

@@ -30,6 +30,7 @@ impl Config {
     /// [`ConfigError::Value`] with the key, what was found and what to do: the first one that is wrong.
     pub fn check(&self) -> Result<(), ConfigError> {
         name("station.name".into(), StationId::new(&self.station.name).map(drop))?;
+        self.station.site()?;
         ensure(!self.satellites.is_empty(), "satellites", "there is none", "Add a [[satellites]] section.")?;
         ensure(!self.links.is_empty(), "links", "there is none", "Add a [[links]] section.")?;
         ensure(
@@ -76,6 +77,9 @@ impl Config {
         }
         self.check_rssi()?;
         self.check_storage()?;
+        self.check_elements()?;
+        self.rotator.as_ref().map_or(Ok(()), super::RotatorSection::check)?;
+        self.rig.as_ref().map_or(Ok(()), super::RigSection::check)?;
         self.check_simulated()
     }
 

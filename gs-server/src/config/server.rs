@@ -3,7 +3,12 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
+use mission::Site;
 use serde::Deserialize;
+use tle::station::StationError;
+use tle::{EarthOrientation, HorizonMask, Station};
+
+use super::ConfigError;
 
 /// `[station]`: who we are.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -14,6 +19,65 @@ pub struct StationSection {
     /// Who says that this machine's clock is right. Default `kernel`.
     #[serde(default)]
     pub clock: ClockSetting,
+    /// Geodetic latitude (WGS84), degrees, north positive. With `longitude_deg`: passes are known.
+    #[serde(default)]
+    pub latitude_deg: Option<f64>,
+    /// Longitude, degrees, east positive, -180 to 360.
+    #[serde(default)]
+    pub longitude_deg: Option<f64>,
+    /// Height above the WGS84 ellipsoid, metres. Default 0.
+    #[serde(default)]
+    pub height_m: f64,
+    /// The least elevation at which anything is heard, degrees. Default 0.
+    #[serde(default)]
+    pub min_elevation_deg: f64,
+    /// What the horizon hides: pairs of azimuth and elevation in degrees, straight lines between them. Default: nothing.
+    #[serde(default)]
+    pub horizon_deg: Vec<[f64; 2]>,
+    /// UT1-UTC, seconds (IERS Bulletin A). Default 0; 0.1 s is worth 46 m at the equator.
+    #[serde(default)]
+    pub dut1_s: f64,
+}
+
+impl StationSection {
+    /// Where the station stands and what it sees; `None` when nobody said.
+    ///
+    /// # Errors
+    /// [`ConfigError`] that names the key.
+    pub fn site(&self) -> Result<Option<Site>, ConfigError> {
+        let (latitude_deg, longitude_deg) = match (self.latitude_deg, self.longitude_deg) {
+            (Some(latitude), Some(longitude)) => (latitude, longitude),
+            (None, None) => return Ok(None),
+            (latitude, _) => {
+                let missing = if latitude.is_none() { "latitude_deg" } else { "longitude_deg" };
+                let remedy = "Give both latitude_deg and longitude_deg, or neither.";
+                return Err(ConfigError::value(format!("station.{missing}"), "it is missing", remedy));
+            }
+        };
+        let wrong = |key: &str, why: String| {
+            ConfigError::value(format!("station.{key}"), why, "Give a value in this range.")
+        };
+        let mut place = Station::new(latitude_deg, longitude_deg, self.height_m).map_err(|error| {
+            let key = match error {
+                StationError::Latitude { .. } => "latitude_deg",
+                StationError::Longitude { .. } => "longitude_deg",
+                StationError::Height { .. } => "height_m",
+            };
+            wrong(key, error.to_string())
+        })?;
+        if !self.horizon_deg.is_empty() {
+            let table: Vec<(f64, f64)> = self.horizon_deg.iter().map(|[az, el]| (*az, *el)).collect();
+            let mask = HorizonMask::from_table(&table).map_err(|error| wrong("horizon_deg", error.to_string()))?;
+            place = place.with_mask(mask);
+        }
+        if !(-90.0..=90.0).contains(&self.min_elevation_deg) {
+            let found = self.min_elevation_deg;
+            return Err(wrong("min_elevation_deg", format!("{found} is outside -90 to 90 degrees")));
+        }
+        let orientation =
+            EarthOrientation::new(self.dut1_s).map_err(|error| wrong("dut1_s", error.to_string()))?;
+        Ok(Some(Site { place, min_elevation_deg: self.min_elevation_deg, orientation }))
+    }
 }
 
 /// Who says that the clock is right before anything is sealed without a stored counter.

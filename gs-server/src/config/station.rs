@@ -52,6 +52,7 @@ pub fn station_config(config: &Config, keys: &BTreeMap<String, Key>) -> Result<S
         station: StationId::new(&config.station.name).map_err(|e| bad("station.name", e))?,
         satellites,
         links,
+        site: config.station.site()?,
     })
 }
 

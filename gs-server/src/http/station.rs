@@ -1,10 +1,10 @@
 //! `GET /api/v1/station`: how the station is right now.
 
-use api::{ImageProgress, LinkView, SatelliteView, SealingView, StationView, StorageView};
+use api::{ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView};
 use axum::Json;
 use axum::extract::State;
-use mission::status::{LinkStatus, SatelliteStatus};
-use mission::{LinkState, Status, UtcUs};
+use mission::status::{LinkStatus, SatelliteStatus, SkyStatus};
+use mission::{LinkState, PassAhead, Status, UtcUs};
 
 use super::App;
 use super::extract::time;
@@ -65,6 +65,9 @@ fn satellite_view(app: &App, status: &SatelliteStatus) -> SatelliteView {
         in_contact: status.in_contact,
         in_view: status.in_view,
         los_at: at(status.los_at),
+        expectation: status.expectation.clone(),
+        elements: status.sky.as_ref().map(elements_view),
+        next_passes: status.sky.iter().flat_map(|sky| &sky.passes).map(next_pass).collect(),
         uplink: status.uplink.clone(),
         outstanding: status.outstanding.map(|id| id.0),
         queued: status.queued as u64,
@@ -75,6 +78,28 @@ fn satellite_view(app: &App, status: &SatelliteStatus) -> SatelliteView {
             conflicts: image.conflicts,
         }),
         download: status.download.map(|id| id.0),
+    }
+}
+
+fn elements_view(sky: &SkyStatus) -> ElementsInUse {
+    ElementsInUse {
+        id: sky.elements.id.0,
+        epoch: time(sky.elements.elements.epoch.unix_us()),
+        age_days: sky.age.age_days,
+        timing_error_s: sky.age.timing_error_s,
+        level: sky.age.level.name().to_owned(),
+        fault: sky.fault.clone(),
+    }
+}
+
+fn next_pass(pass: &PassAhead) -> NextPass {
+    NextPass {
+        aos: time(pass.aos_at.0),
+        tca: time(pass.tca_at.0),
+        los: pass.los_at.map(|los| time(los.0)),
+        max_elevation_deg: pass.max_elevation_deg,
+        azimuths_deg: pass.azimuths_deg,
+        elements: pass.elements.0,
     }
 }
 

@@ -13,6 +13,7 @@
 //! What it does **not** do: keep keys, know HTTP, delete anything that was heard or sent.
 
 mod convert;
+mod convert_sky;
 mod error;
 mod lock;
 mod open;
@@ -45,8 +46,8 @@ pub use read::{
 };
 pub use redecode::{RedecodeProgress, RedecodeReport};
 pub use rows::{
-    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, EventRow, FrameRow, ImageRow, IntentRow,
-    LimitRow, MetaRow, ParameterRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
+    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow, FrameRow,
+    ImageRow, IntentRow, LimitRow, MetaRow, ParameterRow, PassElementsRow, PassRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
 };
 
 use reserve::{Reserve, ReserveError};

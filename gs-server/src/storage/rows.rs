@@ -326,6 +326,66 @@ row! {
 }
 
 row! {
+    /// A set of mean elements.
+    ElementsRow in "elements" {
+        /// Id, rising in the order in which they were added.
+        id: i64,
+        /// Whose.
+        satellite: String,
+        /// The station that keeps them.
+        station: String,
+        /// NORAD_CAT_ID, when their message told it.
+        norad_cat_id: Option<i64>,
+        /// OBJECT_NAME, when their message told it.
+        object_name: Option<String>,
+        /// Their epoch.
+        epoch_us: i64,
+        /// Where they came from.
+        source: String,
+        /// When they were added.
+        added_at_us: i64,
+        /// Who added them.
+        who: String,
+        /// The whole set as one OMM in JSON.
+        omm: String,
+    }
+}
+
+row! {
+    /// A pass over the station, as the elements told it when it was near.
+    PassRow in "passes" {
+        /// Id, rising.
+        id: i64,
+        /// Who passes.
+        satellite: String,
+        /// Over which station.
+        station: String,
+        /// Acquisition of signal.
+        aos_at_us: i64,
+        /// Greatest elevation.
+        tca_at_us: i64,
+        /// Loss of signal; `None` for an object that does not set.
+        los_at_us: Option<i64>,
+        /// Elevation at TCA, degrees.
+        max_elevation_deg: f64,
+        /// When it ended; `None` while it lasts.
+        ended_at_us: Option<i64>,
+    }
+}
+
+row! {
+    /// Elements that a pass used.
+    PassElementsRow in "pass_elements" {
+        /// Which pass.
+        pass: i64,
+        /// Which elements.
+        elements: i64,
+        /// Since when.
+        from_us: i64,
+    }
+}
+
+row! {
     /// An event in the one durable sequence.
     EventRow in "events" {
         /// Its place.

@@ -6,13 +6,18 @@ use mission::snapshot::{
     CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot, Snapshot,
     Witness,
 };
-use mission::{FrameId, SatelliteId, Stage, UtcUs};
+use mission::record::PassRecord;
+use mission::sky::SETS_KEPT;
+use mission::{ElementSet, FrameId, SatelliteId, Stage, UtcUs};
 use protocol::{Counter, DownFrame, Downlink, KeyId, RequestTag, down_type};
 use sqlx::{Row as _, SqliteConnection};
 
-use super::convert::{exactly, narrow, parse};
+use super::convert::{exactly, int, narrow, parse};
 use super::row::{Row as _, select};
-use super::rows::{ChunkRow, CommandRow, DownloadRow, FrameRow, ImageRow, LimitRow, SealedRow, StageRow};
+use super::rows::{
+    ChunkRow, CommandRow, DownloadRow, ElementsRow, FrameRow, ImageRow, LimitRow, PassElementsRow, PassRow,
+    SealedRow, StageRow,
+};
 use super::{Store, StoreError, off_the_loop};
 
 /// A command that is `unknown` may still be settled by telemetry for so long.
@@ -52,6 +57,8 @@ fn is_empty(left: &SatelliteSnapshot) -> bool {
         && left.downloads.is_empty()
         && left.limits.is_empty()
         && left.heartbeat.is_none()
+        && left.elements.is_empty()
+        && left.pass.is_none()
 }
 
 async fn last_ids(connection: &mut SqliteConnection) -> Result<LastIds, StoreError> {
@@ -59,7 +66,9 @@ async fn last_ids(connection: &mut SqliteConnection) -> Result<LastIds, StoreErr
         "select (select coalesce(max(id), 0) from frames) as frame,
                 (select coalesce(max(id), 0) from commands) as command,
                 (select coalesce(max(id), 0) from images) as image,
-                (select coalesce(max(id), 0) from downloads) as download",
+                (select coalesce(max(id), 0) from downloads) as download,
+                (select coalesce(max(id), 0) from elements) as elements,
+                (select coalesce(max(id), 0) from passes) as pass",
     )
     .fetch_one(connection)
     .await?;
@@ -68,6 +77,8 @@ async fn last_ids(connection: &mut SqliteConnection) -> Result<LastIds, StoreErr
         command: narrow("commands.id", row.try_get("command")?)?,
         image: narrow("images.id", row.try_get("image")?)?,
         download: narrow("downloads.id", row.try_get("download")?)?,
+        elements: narrow("elements.id", row.try_get("elements")?)?,
+        pass: narrow("passes.id", row.try_get("pass")?)?,
     })
 }
 
@@ -98,7 +109,41 @@ async fn of_satellite(
             rows.iter().map(|row| LimitRow::read(row)?.record()).collect::<Result<_, _>>()?
         },
         heartbeat: heartbeat(connection, satellite).await?,
+        elements: elements(connection, satellite).await?,
+        pass: pass(connection, satellite).await?,
     })
+}
+
+/// The newest sets by epoch.
+async fn elements(
+    connection: &mut SqliteConnection,
+    satellite: &SatelliteId,
+) -> Result<Vec<ElementSet>, StoreError> {
+    let rows = sqlx::query(select::<ElementsRow>("where satellite = ? order by epoch_us desc, id desc limit ?"))
+        .bind(satellite.as_str())
+        .bind(int("limit", SETS_KEPT as u64)?)
+        .fetch_all(connection)
+        .await?;
+    rows.iter().map(|row| ElementsRow::read(row)?.set()).collect()
+}
+
+/// The newest pass, if it has not ended.
+async fn pass(
+    connection: &mut SqliteConnection,
+    satellite: &SatelliteId,
+) -> Result<Option<PassRecord>, StoreError> {
+    let row = sqlx::query(select::<PassRow>("where satellite = ? and ended_at_us is null order by id desc limit 1"))
+        .bind(satellite.as_str())
+        .fetch_optional(&mut *connection)
+        .await?;
+    let Some(row) = row else { return Ok(None) };
+    let pass = PassRow::read(&row)?;
+    let used = sqlx::query(select::<PassElementsRow>("where pass = ? order by id"))
+        .bind(pass.id)
+        .fetch_all(connection)
+        .await?;
+    let used: Vec<_> = used.iter().map(PassElementsRow::read).collect::<Result<_, _>>()?;
+    pass.record(&used).map(Some)
 }
 
 async fn last_tag(

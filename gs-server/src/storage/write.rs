@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use mission::record::{
-    AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, ReceptionRssi,
+    AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, PassRecord, ReceptionRssi,
     Record, Route, StageRecord, TelemetryRecord,
 };
 use mission::{Batch, StationId};
@@ -13,8 +13,8 @@ use sqlx::{AssertSqlSafe, Connection as _, Row as _, SqliteConnection};
 use super::convert::{int, route};
 use super::row::{Row, select, upsert};
 use super::rows::{
-    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, EventRow, FrameRow, ImageRow, IntentRow,
-    LimitRow, ParameterRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
+    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow, FrameRow, ImageRow,
+    IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::{StoreError, StoredEvent};
 
@@ -205,6 +205,8 @@ impl Transaction<'_> {
             Record::Chunk(chunk) => self.insert(&ChunkRow::of(chunk)?).await?,
             Record::Download(download) => self.download(download).await?,
             Record::Limit(limit) => self.limit(limit).await?,
+            Record::Elements(set) => self.insert(&ElementsRow::of(set)?).await?,
+            Record::Pass(pass) => self.pass(pass).await?,
             Record::Event(event) => return self.event(event).await.map(Some),
             Record::Audit(audit) => self.audit(audit).await?,
             Record::Intent(receipt) => self.insert(&IntentRow::of(receipt, self.station)?).await?,
@@ -395,6 +397,15 @@ impl Transaction<'_> {
 
     async fn limit(&mut self, record: &LimitRecord) -> Result<(), StoreError> {
         self.upsert("satellite, parameter", &LimitRow::of(record, self.station)).await
+    }
+
+    async fn pass(&mut self, record: &PassRecord) -> Result<(), StoreError> {
+        self.upsert("id", &PassRow::of(record)?).await?;
+        for row in PassElementsRow::of(record)? {
+            let insert = AssertSqlSafe(format!("{} on conflict do nothing", PassElementsRow::INSERT));
+            row.bind(sqlx::query(insert)).execute(&mut *self.connection).await?;
+        }
+        Ok(())
     }
 
     async fn event(&mut self, record: &EventRecord) -> Result<StoredEvent, StoreError> {

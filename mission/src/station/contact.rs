@@ -99,6 +99,16 @@ impl Contact {
         self.view = Some(view);
     }
 
+    /// Nobody says whether it is in view any more.
+    pub(super) fn forget_view(&mut self) {
+        self.view = None;
+    }
+
+    /// How long one heartbeat period is, microseconds.
+    pub(super) fn period_us(&self) -> u64 {
+        self.period_us
+    }
+
     /// `None` when nobody says.
     pub(super) fn in_view(&self) -> Option<bool> {
         self.view.map(|view| view.is_some())

@@ -12,6 +12,7 @@ use super::{Link, Station};
 use crate::clock::{MonoUs, Now};
 use crate::port::LinkState;
 use crate::record::Gate;
+use crate::sky::clock_time;
 
 /// Without contact, listen for this long before a blind transmission.
 const LISTEN_FIRST_US: u64 = 5_000_000;
@@ -92,13 +93,20 @@ fn link_gate(link: &Link, now: Now, gate: Gate) -> Result<(), Wait> {
 }
 
 fn contact_gate(sat: &Satellite, now: Now, gate: Gate) -> Result<(), Wait> {
+    // Outside a pass nothing is radiated, blind commands neither.
+    if sat.contact.in_view() == Some(false) {
+        return Err(match sat.sky.next_aos(now.utc) {
+            Some(aos) => Wait {
+                why: format!("below the horizon until {}", clock_time(aos, now.utc)).into(),
+                until: Some(mono_of(now, aos)),
+            },
+            None => wait("the satellite is below the horizon", None),
+        });
+    }
     if gate == Gate::Blind || sat.contact.is_open(now.mono) {
         return Ok(());
     }
-    Err(match sat.contact.in_view() {
-        Some(false) => wait("the satellite is below the horizon", None),
-        _ => wait("listening: the satellite was not heard lately", None),
-    })
+    Err(wait("listening: the satellite was not heard lately", None))
 }
 
 fn silence_gate(sat: &Satellite, link: &Link, now: Now) -> Result<(), Wait> {

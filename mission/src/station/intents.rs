@@ -74,6 +74,9 @@ impl Station {
                 self.confirm_counter(now, s, who);
                 Ok(Accepted::Done)
             }
+            Intent::AddElements { satellite, elements, source } => {
+                self.add_elements(now, who, &satellite, elements, &source)
+            }
             Intent::ArmLink { link, armed } => {
                 let l = self.link_index(&link).ok_or_else(|| Refusal::UnknownLink(link.to_string()))?;
                 if armed && self.links[l].config.receive_only {

@@ -9,6 +9,7 @@ use super::link::Link;
 use super::outcome::mono_of;
 use super::satellite::{Before, Command, Download, Exchange, Satellite, Settling};
 use super::sealing::Sealer;
+use super::sky::Sky;
 use super::{About, Entropy, Station};
 use crate::clock::{MonoUs, Now};
 use crate::config::{SatelliteConfig, StationConfig};
@@ -54,6 +55,7 @@ pub(super) fn station(
         effects: VecDeque::new(),
         satellites,
         links,
+        site: config.site,
         ids: snapshot.last_ids,
         last_tx: 0,
         recent: VecDeque::new(),
@@ -119,6 +121,7 @@ fn satellite(
         download,
         last_tag: left.and_then(|l| l.last_tag),
         uptime: left.and_then(|l| l.heartbeat).map(|(_, at, uptime)| (at, uptime)),
+        sky: Sky::restore(left),
         note: "starting".to_owned(),
         wake: None,
     }

@@ -9,6 +9,7 @@ use super::contact::Contact;
 use super::image::Assembly;
 use super::journal::Ticket;
 use super::sealing::Sealer;
+use super::sky::Sky;
 use crate::clock::{MonoUs, Now, UtcUs};
 use crate::config::Profile;
 use crate::id::{CommandId, SatelliteId, TxId};
@@ -196,6 +197,8 @@ pub(super) struct Satellite {
     pub(super) last_tag: Option<RequestTag>,
     /// Of the newest heartbeat: when it was heard, uptime in ms.
     pub(super) uptime: Option<(UtcUs, u32)>,
+    /// Its elements and passes.
+    pub(super) sky: Sky,
     /// What the uplink is doing, for people.
     pub(super) note: String,
     /// When the uplink wants to be looked at again.

@@ -56,6 +56,8 @@ impl Station {
             in_contact: sat.contact.is_open(now.mono),
             in_view: sat.contact.in_view(),
             los_at: sat.contact.los(),
+            expectation: sat.expectation(now),
+            sky: sat.sky.status(now.utc),
             uplink: sat.note.clone(),
             outstanding: sat.outstanding(),
             queued: sat.queue().len(),

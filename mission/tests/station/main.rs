@@ -16,6 +16,7 @@ mod images;
 mod locks;
 mod order;
 mod restarts;
+mod sky;
 mod storage;
 mod stored;
 mod world;

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use mission::record::{CommandRecord, DownloadRecord, DownloadState};
+use mission::record::{CommandRecord, DownloadRecord, DownloadState, PassRecord};
 use mission::snapshot::{
     CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot,
 };
-use mission::{Record, Snapshot, Stage};
+use mission::{ElementSet, Record, Snapshot, Stage};
 use protocol::Counter;
 
 use crate::world::World;
@@ -20,8 +20,18 @@ impl World {
         let mut counter: Option<Counter> = None;
         let mut image: Option<ImageSnapshot> = None;
         let mut downloads: Vec<DownloadRecord> = Vec::new();
+        let mut elements = Vec::new();
+        let mut pass: Option<PassRecord> = None;
         for record in &self.stored {
             match record {
+                Record::Elements(row) => {
+                    ids.elements = row.id.0;
+                    elements.push(ElementSet { id: row.id, elements: Arc::clone(&row.elements) });
+                }
+                Record::Pass(row) => {
+                    ids.pass = row.id.0;
+                    pass = Some(row.clone());
+                }
                 Record::Frame(row) => ids.frame = ids.frame.max(row.id.0),
                 Record::Command(row) => {
                     ids.command = row.id.0;
@@ -80,6 +90,8 @@ impl World {
                 downloads,
                 limits: Vec::new(),
                 heartbeat: None,
+                elements,
+                pass: pass.filter(|pass| pass.ended_at.is_none()),
             }],
             keys: vec![KeySnapshot { key: self.key(), counter, witness: self.witness.clone() }],
         }

@@ -45,12 +45,13 @@ pub(crate) struct Setup {
     pub(crate) limits: Vec<mission::LimitRule>,
     pub(crate) second_satellite: bool,
     pub(crate) key: [u8; 16],
+    pub(crate) site: Option<mission::Site>,
 }
 
 impl Default for Setup {
     fn default() -> Self {
         let profile = Profile { rssi: false, ..Profile::default() };
-        Self { profile, limits: Vec::new(), second_satellite: false, key: [7; 16] }
+        Self { profile, limits: Vec::new(), second_satellite: false, key: [7; 16], site: None }
     }
 }
 
@@ -95,7 +96,7 @@ fn config(setup: &Setup) -> StationConfig {
         satellites.push(satellite("pixelsat-2"));
         links.push(link("radio-2", "pixelsat-2", false));
     }
-    StationConfig { station: StationId::new("home").unwrap(), satellites, links }
+    StationConfig { station: StationId::new("home").unwrap(), satellites, links, site: setup.site.clone() }
 }
 
 impl World {

@@ -24,6 +24,7 @@ use tower::ServiceExt as _;
 use super::{AllowedHosts, HttpState, Identity, Token, router, serve};
 use crate::clock::{SystemClock, Timer, wall_sleep};
 use crate::config::ClockSetting;
+use crate::elements::{ElementsHandle, Wanted};
 use crate::engine::{Engine, EngineInbox, EngineMessage, EngineParts, LinkPort, OsEntropy};
 use crate::hub::Hub;
 use crate::storage::{Store, StoreOptions};
@@ -86,7 +87,13 @@ impl Bench {
         tokio::spawn(engine.run(stop.clone(), stop.clone()));
         // A radio that takes everything and never answers.
         tokio::spawn(async move { while link.recv().await.is_some() {} });
+        let wanted = vec![Wanted {
+            satellite: SatelliteId::new("pixelsat-1").unwrap(),
+            norad_cat_id: Some(25_544),
+            object_name: None,
+        }];
         let state = HttpState {
+            elements: ElementsHandle::without_sources(wanted, Arc::clone(&timer)),
             store: store.clone(),
             engine: handle,
             hub: hub.clone(),
@@ -215,6 +222,7 @@ fn station() -> StationConfig {
     let satellite = SatelliteId::new("pixelsat-1").unwrap();
     StationConfig {
         station: StationId::new("bench").unwrap(),
+        site: None,
         satellites: vec![SatelliteConfig {
             id: satellite.clone(),
             profile: Profile::default(),

@@ -6,6 +6,7 @@ mod commands;
 mod events;
 mod frames;
 mod images;
+mod sky;
 mod telemetry;
 
 pub use commands::{CommandLife, CommandNow, CommandQuery};
