@@ -1,0 +1,152 @@
+//! A bound from above: every antenna by itself, and a price for every job.
+//!
+//! Without the rule that a job is taken once and in one piece, each antenna is a dynamic programme over the seconds. The
+//! rule comes back as a price per job (Lagrange): an antenna pays it for each piece, the bound gains it once. The prices
+//! are found by subgradient steps. If the antennas' own answers keep the rule and no price is paid in vain, they are
+//! the best answer.
+
+use super::task::{Piece, Task};
+
+/// The best an antenna can earn from each second on, at the given prices.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ahead {
+    from_s: i64,
+    earn: Vec<i64>,
+    /// The piece that begins in this second, in the best continuation: choice and end.
+    take: Vec<Option<(u32, i64)>>,
+}
+
+impl Ahead {
+    /// What can still be earned by pieces that begin at or after `at_s`.
+    pub(super) fn earn(&self, at_s: i64) -> i64 {
+        let index = usize::try_from((at_s - self.from_s).max(0)).unwrap_or(usize::MAX);
+        self.earn.get(index).copied().unwrap_or(0)
+    }
+
+    fn of(task: &Task, antenna: usize, prices: &[i64]) -> Self {
+        let (from_s, until_s) = task.span_s();
+        let length = usize::try_from(until_s - from_s).unwrap_or(0);
+        let mut ahead = Self { from_s, earn: vec![0; length + 1], take: vec![None; length + 1] };
+        let gap_s = task.gap_s[antenna];
+        let mut by_latest: Vec<usize> =
+            (0..task.choices.len()).filter(|&i| task.choices[i].antenna == antenna).collect();
+        by_latest.sort_by_key(|&i| task.choices[i].latest_s());
+        // The choices that can begin in this second, with the best end found so far: (choice, rate * end + rest, end).
+        let mut open: Vec<(usize, i64, i64)> = Vec::new();
+        for index in (0..length).rev() {
+            let at_s = from_s + index as i64;
+            while let Some(&next) = by_latest.last().filter(|&&i| task.choices[i].latest_s() >= at_s) {
+                by_latest.pop();
+                open.push((next, i64::MIN, 0));
+            }
+            let mut best = ahead.earn[index + 1];
+            let mut take = None;
+            for (choice, reach, end_s) in &mut open {
+                let c = &task.choices[*choice];
+                let stop_s = at_s + c.min_s;
+                let with = c.rate * stop_s + ahead.earn(stop_s + gap_s);
+                if with > *reach {
+                    (*reach, *end_s) = (with, stop_s);
+                }
+                let worth = *reach - c.rate * at_s + c.promise - prices[c.job];
+                if worth > best && (at_s == c.from_s || !c.is_rigid()) {
+                    best = worth;
+                    take = Some((u32::try_from(*choice).unwrap_or(u32::MAX), *end_s));
+                }
+            }
+            ahead.earn[index] = best;
+            ahead.take[index] = take;
+            open.retain(|(choice, ..)| task.choices[*choice].from_s < at_s);
+        }
+        ahead
+    }
+
+    /// The pieces of the best continuation from the begin.
+    fn trace(&self, gap_s: i64, pieces: &mut Vec<Piece>) {
+        let mut index = 0;
+        while let Some(take) = self.take.get(index) {
+            match *take {
+                None => index += 1,
+                Some((choice, stop_s)) => {
+                    let start_s = self.from_s + index as i64;
+                    pieces.push(Piece { choice: choice as usize, start_s, stop_s });
+                    index = usize::try_from(stop_s + gap_s - self.from_s).unwrap_or(usize::MAX);
+                }
+            }
+        }
+    }
+}
+
+/// The best bound that was found, and what it was made of.
+#[derive(Debug, Clone)]
+pub(super) struct Relaxed {
+    pub(super) ahead: Vec<Ahead>,
+    pub(super) prices: Vec<i64>,
+    pub(super) bound: i64,
+    /// An answer that keeps the rules.
+    pub(super) pieces: Vec<Piece>,
+}
+
+/// How many steps the prices get.
+const STEPS: usize = 40;
+
+/// Looks for prices with a low bound.
+pub(super) fn relax(task: &Task) -> Relaxed {
+    let mut prices = vec![0i64; task.jobs];
+    let mut best: Option<Relaxed> = None;
+    let mut held: (i64, Vec<Piece>) = (i64::MIN, Vec::new());
+    let mut pace = 1.0;
+    let mut since_better = 0;
+    for _ in 0..STEPS {
+        let ahead: Vec<Ahead> = (0..task.gap_s.len()).map(|a| Ahead::of(task, a, &prices)).collect();
+        let bound = ahead.iter().map(|a| a.earn.first().copied().unwrap_or(0)).sum::<i64>()
+            + prices.iter().sum::<i64>();
+        let mut pieces = Vec::new();
+        for (antenna, gap_s) in ahead.iter().zip(&task.gap_s) {
+            antenna.trace(*gap_s, &mut pieces);
+        }
+        let mut uses = vec![0i64; task.jobs];
+        for piece in &pieces {
+            uses[task.choices[piece.choice].job] += 1;
+        }
+        let kept = once_each(task, pieces);
+        let weight = task.weight(&kept);
+        if weight > held.0 {
+            held = (weight, kept);
+        }
+        if best.as_ref().is_none_or(|b| bound < b.bound) {
+            best = Some(Relaxed { ahead, prices: prices.clone(), bound, pieces: Vec::new() });
+            since_better = 0;
+        } else {
+            since_better += 1;
+        }
+        if since_better == 4 {
+            pace /= 2.0;
+            since_better = 0;
+        }
+        let lowest = best.as_ref().map_or(bound, |b| b.bound);
+        let slope: Vec<i64> =
+            uses.iter().zip(&prices).map(|(u, p)| if *u == 0 && *p == 0 { 0 } else { u - 1 }).collect();
+        let steepness: i64 = slope.iter().map(|s| s * s).sum();
+        if lowest <= held.0 || steepness == 0 {
+            break;
+        }
+        // Towards a target a little above what is held: the true answer lies between.
+        let step = pace * ((bound - held.0) as f64) / steepness as f64;
+        for (price, slope) in prices.iter_mut().zip(&slope) {
+            *price = (*price + (step * *slope as f64) as i64).max(0);
+        }
+    }
+    let mut found = best.unwrap_or(Relaxed { ahead: Vec::new(), prices, bound: 0, pieces: Vec::new() });
+    found.pieces = held.1;
+    found
+}
+
+/// Of each job only its weightiest piece.
+fn once_each(task: &Task, mut pieces: Vec<Piece>) -> Vec<Piece> {
+    let weight = |p: &Piece| task.choices[p.choice].weight(p.start_s, p.stop_s);
+    pieces.sort_by_key(|p| (std::cmp::Reverse(weight(p)), p.start_s, p.choice));
+    let mut taken = vec![false; task.jobs];
+    pieces.retain(|p| !std::mem::replace(&mut taken[task.choices[p.choice].job], true));
+    pieces
+}
