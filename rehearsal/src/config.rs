@@ -1,6 +1,7 @@
 //! What kind of world.
 
-use satellite::{ChannelConfig, PassProfile};
+use satellite::{ChannelConfig, Orbit, PassProfile};
+use tle::Station;
 
 /// A world by its seed.
 #[derive(Debug, Clone)]
@@ -9,6 +10,10 @@ pub struct WorldConfig {
     pub seed: u64,
     /// The air: losses, flips, bursts, passes. Its seed is set from `seed`.
     pub channel: ChannelConfig,
+    /// What the satellite flies; `None`: made up by the seed. It decides the passes where `channel.passes` follows it.
+    pub orbit: Option<Orbit>,
+    /// UTC at the beginning, ms since 1970.
+    pub utc_at_zero_ms: u64,
     /// Size of the satellite's images in bytes.
     pub image_bytes: u32,
     /// A real picture instead of a pattern (slow to make).
@@ -55,6 +60,9 @@ impl WorldConfig {
         Self {
             seed,
             channel: ChannelConfig::perfect(),
+            orbit: None,
+            // 2027-03-20T12:00:00Z
+            utc_at_zero_ms: 1_805_544_000_000,
             image_bytes: 12_000,
             real_picture: false,
             ranges: false,
@@ -73,11 +81,20 @@ impl WorldConfig {
         self
     }
 
-    /// The same with the passes of an orbit instead of a satellite that stands still.
+    /// The same with stored passes, like those of an orbit, instead of a satellite that stands still.
     #[must_use]
     pub fn with_passes(mut self) -> Self {
         self.channel.passes = PassProfile::default();
         self.channel.elevation_loss = true;
+        self
+    }
+
+    /// The same with the true passes of an orbit over a station, from this UTC (ms since 1970) on.
+    #[must_use]
+    pub fn with_orbit(mut self, orbit: Orbit, station: Station, utc_at_zero_ms: u64) -> Self {
+        self.channel.passes = PassProfile::seen_from(station);
+        self.channel.elevation_loss = true;
+        (self.orbit, self.utc_at_zero_ms) = (Some(orbit), utc_at_zero_ms);
         self
     }
 }

@@ -88,8 +88,10 @@ impl World {
             twin.image = ImageSource::Bytes { bytes: bytes.into(), width_px: 408, height_px: 304 };
         }
         twin.ranges = config.ranges;
+        twin.orbit = config.orbit.clone();
+        twin.utc_at_zero_ms = config.utc_at_zero_ms;
         let utc_at_zero_us = i64::try_from(twin.utc_at_zero_ms).unwrap_or(0) * 1_000;
-        let device =
+        let mut device =
             Device::new(DeviceConfig::new(twin, config.channel.clone(), ModelConfig::prepared(true)));
         let (satellite, link) = (named("pixelsat-1"), named_link("radio"));
         let desk =
@@ -566,6 +568,7 @@ impl World {
     fn station_config(&self) -> StationConfig {
         StationConfig {
             station: station_name(),
+            site: None,
             satellites: vec![SatelliteConfig {
                 id: self.satellite.clone(),
                 profile: Profile {

@@ -5,7 +5,8 @@ use protocol::{AdcsInfo, Heartbeat};
 use crate::{
     attitude::{Attitude, AttitudeMode},
     noise::{mix, unit},
-    orbit::{Orbit, Place, towards_ground},
+    orbit::Orbit,
+    place::Place,
     vector::{Rotation, Vec3, add, dot, length, scale, unit_of},
 };
 
@@ -38,7 +39,7 @@ pub(crate) struct Reading {
 }
 
 /// Orbit, attitude and sensors.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Body {
     seed: u64,
     orbit: Orbit,
@@ -59,16 +60,26 @@ struct Sensed {
 }
 
 impl Body {
-    pub(crate) fn new(seed: u64, now_us: u64) -> Self {
+    pub(crate) fn new(seed: u64, now_us: u64, orbit: Orbit) -> Self {
         let pick = |key: u64| f64::from(unit(mix(seed ^ 0xb0d7) ^ key)) * 2.0 - 1.0;
         let from = Rotation::from_mrp([pick(1) * 0.5, pick(2) * 0.5, pick(3) * 0.5]);
         let omega = [pick(4) * 0.06, pick(5) * 0.06, 0.03 + pick(6) * 0.03];
         Self {
             seed,
-            orbit: Orbit::new(seed),
+            orbit,
             attitude: Attitude::tumbling(now_us, from, omega),
             gyro_bias_rad_s: [pick(7) * 2e-3, pick(8) * 2e-3, pick(9) * 2e-3],
         }
+    }
+
+    /// The orbit it flies.
+    pub(crate) fn orbit(&self) -> &Orbit {
+        &self.orbit
+    }
+
+    /// It flies another orbit from now on.
+    pub(crate) fn set_orbit(&mut self, orbit: Orbit) {
+        self.orbit = orbit;
     }
 
     pub(crate) fn kill_rotation(&mut self, now_us: u64) {
@@ -82,15 +93,15 @@ impl Body {
 
     /// Turns the camera to a place on the ground.
     pub(crate) fn point_ground(&mut self, now_us: u64, utc_ms: u64, latitude_deg: f32, longitude_deg: f32) {
-        let place = self.orbit.at(utc_ms);
-        let sight = towards_ground(&place, latitude_deg.into(), longitude_deg.into(), utc_ms);
+        let place = Place::of(&self.orbit, utc_ms);
+        let sight = place.towards_ground(latitude_deg.into(), longitude_deg.into(), utc_ms);
         let target = Rotation::between(CAMERA_AXIS, sight);
         self.attitude.turn_to(now_us, target, AttitudeMode::TrackingTarget);
     }
 
     /// Turns the camera straight down.
     pub(crate) fn point_nadir(&mut self, now_us: u64, utc_ms: u64) {
-        let down = unit_of(scale(self.orbit.at(utc_ms).r_teme_km, -1.0));
+        let down = unit_of(scale(Place::of(&self.orbit, utc_ms).r_teme_km, -1.0));
         let target = Rotation::between(CAMERA_AXIS, down);
         self.attitude.turn_to(now_us, target, AttitudeMode::TrackingTarget);
     }
@@ -148,7 +159,7 @@ impl Body {
     }
 
     fn sense(&self, reading: &Reading) -> Sensed {
-        let place = self.orbit.at(reading.utc_ms);
+        let place = Place::of(&self.orbit, reading.utc_ms);
         let rotation = self.attitude.rotation(reading.now_us);
         let to_body = rotation.inverse();
         let grain = |channel: u64, size: f64| {
@@ -158,9 +169,9 @@ impl Body {
             [grain(channel, size), grain(channel + 1, size), grain(channel + 2, size)]
         };
         let sun = to_body.turn(place.sun_teme);
-        let light = if place.in_eclipse { 0.0 } else { 1.0 };
-        let side =
-            |index: usize, towards: f64| (light * towards.max(0.0) + grain(20 + index as u64, 0.01)).max(0.0);
+        let side = |index: usize, towards: f64| {
+            (place.lit * towards.max(0.0) + grain(20 + index as u64, 0.01)).max(0.0)
+        };
         let css = [
             side(0, sun[0]),
             side(1, -sun[0]),
@@ -199,6 +210,10 @@ fn radiation(place: &Place) -> f64 {
 mod tests {
     use super::*;
 
+    fn body(seed: u64) -> Body {
+        Body::new(seed, 0, Orbit::fictional(seed, tle::UtcInstant::from_unix_us(1_790_000_000_000_000)))
+    }
+
     fn reading(now_us: u64) -> Reading {
         Reading {
             now_us,
@@ -212,7 +227,7 @@ mod tests {
 
     #[test]
     fn a_day_of_heartbeats_is_finite_and_plausible() {
-        let body = Body::new(11, 0);
+        let body = body(11);
         for minute in 0..1_440 {
             let beat = body.heartbeat(&reading(minute * 60_000_000));
             assert!((-20.0..45.0).contains(&beat.temp_c), "{}", beat.temp_c);
@@ -226,7 +241,7 @@ mod tests {
 
     #[test]
     fn failed_sensors_say_nan_and_the_rest_goes_on() {
-        let body = Body::new(11, 0);
+        let body = body(11);
         let beat = body.heartbeat(&Reading { sensor_nan: true, ..reading(0) });
         assert!(beat.omega_rad_s.iter().chain(&beat.css).all(|value| value.is_nan()));
         assert!(beat.r_teme_km.iter().all(|axis| axis.is_finite()) && beat.temp_c.is_finite());
@@ -238,7 +253,7 @@ mod tests {
 
     #[test]
     fn pointing_settles_at_the_target() {
-        let mut body = Body::new(2, 0);
+        let mut body = body(2);
         body.point_attitude(0, [0.1, 0.2, -0.1]);
         let info = body.adcs_info(&reading(600_000_000));
         assert_eq!(info.mode, 1);

@@ -3,8 +3,16 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::passes::{PassProfile, delay_us, range_km};
+use tle::UtcInstant;
 
+use crate::{
+    orbit::Orbit,
+    passes::PassProfile,
+    sky::{Sky, SkyLook},
+};
+
+/// Distance that [`RSSI_ZENITH_DBM`] refers to, km.
+const REFERENCE_KM: f64 = 500.0;
 /// Received power at 500 km, dBm: a small directional antenna on the ground (radio.md 8).
 const RSSI_ZENITH_DBM: f64 = -106.0;
 /// Extra loss at the very horizon (ground reflection, buildings), dB; gone at [`HORIZON_DEG`].
@@ -45,7 +53,7 @@ pub struct ChannelConfig {
     pub cut: f64,
     /// Chance per downlink frame that the receiver makes a few bytes of junk before it.
     pub noise: f64,
-    /// When the satellite is in view, and how high.
+    /// When the satellite is in view, and how high. Fixed from [`Channel::new`] on.
     pub passes: PassProfile,
     /// Whether weak signals near the horizon are lost more often. Below the horizon nothing is heard in any case.
     pub elevation_loss: bool,
@@ -131,17 +139,19 @@ pub struct ChannelStats {
 #[derive(Clone, Debug)]
 pub struct Channel {
     config: ChannelConfig,
+    sky: Sky,
     rng: ChaCha8Rng,
     in_burst: bool,
     stats: ChannelStats,
 }
 
 impl Channel {
-    /// A channel at its beginning.
+    /// A channel at its beginning, to a satellite on this orbit. `utc_at_zero` is the UTC at microsecond 0.
     #[must_use]
-    pub fn new(config: ChannelConfig) -> Self {
+    pub fn new(config: ChannelConfig, orbit: &Orbit, utc_at_zero: UtcInstant) -> Self {
         let rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x00c4_a22e_1000_0000);
-        Self { config, rng, in_burst: false, stats: ChannelStats::default() }
+        let sky = Sky::new(&config.passes, orbit, utc_at_zero);
+        Self { config, sky, rng, in_burst: false, stats: ChannelStats::default() }
     }
 
     /// A frame on its way from the satellite to the ground.
@@ -189,10 +199,9 @@ impl Channel {
         &mut self.config
     }
 
-    /// Time the signal takes one way now, microseconds.
-    #[must_use]
-    pub fn delay_us(&self, now_us: u64) -> u64 {
-        delay_us(self.config.passes.elevation_deg(now_us))
+    /// The sky over the station.
+    pub fn sky_mut(&mut self) -> &mut Sky {
+        &mut self.sky
     }
 
     /// What it did so far.
@@ -202,12 +211,11 @@ impl Channel {
     }
 
     fn carry(&mut self, now_us: u64, packet: &[u8]) -> Result<(Vec<u8>, i16), LossCause> {
-        if !self.config.passes.in_view(now_us) {
+        if !self.sky.in_view(now_us) {
             self.stats.out_of_view += 1;
             return Err(LossCause::OutOfView);
         }
-        let power_dbm = mean_rssi_dbm(self.config.passes.elevation_deg(now_us))
-            + self.rng.random_range(-FADING_DB..=FADING_DB);
+        let power_dbm = mean_rssi_dbm(&self.sky.look(now_us)) + self.rng.random_range(-FADING_DB..=FADING_DB);
         if self.config.elevation_loss && self.chance(weak_loss(power_dbm)) {
             return Err(LossCause::Weak);
         }
@@ -256,11 +264,11 @@ impl Channel {
     }
 }
 
-/// Mean strength at the ground, dBm.
+/// Mean strength at the ground, dBm: spreading over the true distance, and what the horizon takes.
 #[must_use]
-pub fn mean_rssi_dbm(elevation_deg: f64) -> f64 {
-    let spreading_db = 20.0 * (range_km(elevation_deg) / range_km(90.0)).log10();
-    let horizon_db = HORIZON_LOSS_DB * (1.0 - elevation_deg / HORIZON_DEG).clamp(0.0, 1.0);
+pub fn mean_rssi_dbm(look: &SkyLook) -> f64 {
+    let spreading_db = 20.0 * (look.range_km / REFERENCE_KM).log10();
+    let horizon_db = HORIZON_LOSS_DB * (1.0 - look.elevation_deg / HORIZON_DEG).clamp(0.0, 1.0);
     RSSI_ZENITH_DBM - spreading_db - horizon_db
 }
 
@@ -273,6 +281,11 @@ fn weak_loss(power_dbm: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn channel(config: ChannelConfig) -> Channel {
+        let start = UtcInstant::from_unix_us(1_790_000_000_000_000);
+        Channel::new(config, &Orbit::fictional(1, start), start)
+    }
+
     fn received(transit: Transit) -> Option<Reception> {
         match transit {
             Transit::Received(reception) => Some(reception),
@@ -282,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_perfect_channel_changes_nothing() {
-        let mut channel = Channel::new(ChannelConfig::perfect());
+        let mut channel = channel(ChannelConfig::perfect());
         for _ in 0..1000 {
             let reception = received(channel.down(0, &[7; 240])).unwrap();
             assert_eq!(reception.bytes, [7; 240]);
@@ -293,7 +306,7 @@ mod tests {
 
     #[test]
     fn the_loss_rate_is_what_was_asked_for_both_ways() {
-        let mut channel = Channel::new(ChannelConfig { loss: 0.2, ..ChannelConfig::perfect() });
+        let mut channel = channel(ChannelConfig { loss: 0.2, ..ChannelConfig::perfect() });
         let lost = (0..10_000).filter(|_| received(channel.down(0, &[1])).is_none()).count();
         assert!((1_850..2_150).contains(&lost), "{lost}");
         let lost = (0..10_000).filter(|_| received(channel.up(0, &[1])).is_none()).count();
@@ -303,7 +316,7 @@ mod tests {
     #[test]
     fn bursts_come_in_runs_of_the_stated_mean_length() {
         let burst = Burst { enter: 0.02, leave: 0.2, loss: 1.0 };
-        let mut channel = Channel::new(ChannelConfig { burst: Some(burst), ..ChannelConfig::perfect() });
+        let mut channel = channel(ChannelConfig { burst: Some(burst), ..ChannelConfig::perfect() });
         let lost: Vec<bool> = (0..50_000).map(|_| received(channel.down(0, &[1])).is_none()).collect();
         let total = lost.iter().filter(|&&lost| lost).count();
         let runs = lost.windows(2).filter(|pair| !pair[0] && pair[1]).count();
@@ -313,7 +326,7 @@ mod tests {
 
     #[test]
     fn flips_hit_the_stated_share_of_bytes_by_one_bit() {
-        let mut channel = Channel::new(ChannelConfig { flips: 1e-3, ..ChannelConfig::perfect() });
+        let mut channel = channel(ChannelConfig { flips: 1e-3, ..ChannelConfig::perfect() });
         let mut bits = 0;
         for _ in 0..10_000 {
             let reception = received(channel.down(0, &[0; 240])).unwrap();
@@ -330,7 +343,7 @@ mod tests {
             ..ChannelConfig::default()
         };
         let lost = |elevation_deg| {
-            let mut channel = Channel::new(at(elevation_deg));
+            let mut channel = channel(at(elevation_deg));
             (0..2_000).filter(|_| received(channel.down(0, &[1])).is_none()).count()
         };
         assert!(lost(0.5) > 1_000);
@@ -342,7 +355,7 @@ mod tests {
     #[test]
     fn cut_frames_keep_their_tail_and_noise_stands_before() {
         let config = ChannelConfig { cut: 1.0, noise: 1.0, ..ChannelConfig::perfect() };
-        let mut channel = Channel::new(config);
+        let mut channel = channel(config);
         let packet: Vec<u8> = (0..=239).collect();
         for _ in 0..100 {
             let reception = received(channel.down(0, &packet)).unwrap();
@@ -356,7 +369,7 @@ mod tests {
         let config =
             ChannelConfig { loss: 0.3, flips: 1e-2, cut: 0.1, noise: 0.1, ..ChannelConfig::perfect() };
         let run = |seed| {
-            let mut channel = Channel::new(ChannelConfig { seed, ..config.clone() });
+            let mut channel = channel(ChannelConfig { seed, ..config.clone() });
             (0..200).map(|_| channel.down(0, &[5; 100])).collect::<Vec<_>>()
         };
         assert_eq!(run(1), run(1));

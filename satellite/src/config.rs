@@ -3,6 +3,9 @@
 use std::sync::Arc;
 
 use protocol::Key;
+use tle::UtcInstant;
+
+use crate::orbit::Orbit;
 
 /// What the satellite does about counters it has seen (ICD, *Nonce and replay*): the real one may do any of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -81,7 +84,7 @@ pub enum Fault {
 /// What the twin is. Times are microseconds on the caller's monotonic scale.
 #[derive(Clone, Debug)]
 pub struct TwinConfig {
-    /// Orbit, attitude, noise and pictures follow from this.
+    /// Attitude, noise and pictures follow from this, and the orbit if there is none.
     pub seed: u64,
     /// Shared with ground.
     pub key: Key,
@@ -89,6 +92,8 @@ pub struct TwinConfig {
     pub start_us: u64,
     /// True time when the monotonic scale is 0, ms since 1970 UTC. The satellite knows it only by SetTimestamp.
     pub utc_at_zero_ms: u64,
+    /// What it flies; `None`: [`Orbit::fictional`] by the seed, from the time when the monotonic scale was 0.
+    pub orbit: Option<Orbit>,
     /// From one heartbeat to the next.
     pub heartbeat_period_us: u64,
     /// The same while the battery is low.
@@ -124,6 +129,7 @@ impl TwinConfig {
             start_us: 0,
             // 2027-03-20T12:00:00Z
             utc_at_zero_ms: 1_805_544_000_000,
+            orbit: None,
             heartbeat_period_us: 60 * SECOND_US,
             heartbeat_period_low_us: 240 * SECOND_US,
             first_heartbeat_us: 3 * SECOND_US,
@@ -136,5 +142,11 @@ impl TwinConfig {
             camera: Camera::Picture,
             faults: Vec::new(),
         }
+    }
+
+    /// True time when the monotonic scale is 0.
+    #[must_use]
+    pub fn utc_at_zero(&self) -> UtcInstant {
+        UtcInstant::from_unix_us(i64::try_from(self.utc_at_zero_ms).unwrap_or(i64::MAX).saturating_mul(1000))
     }
 }

@@ -9,9 +9,10 @@ use radio::{
     airtime::LinkTiming,
     model::{ModelConfig, ModelOutput, Module},
 };
+use tle::{PropagationError, doppler::downlink_shift_hz};
 
 use crate::{
-    Channel, ChannelConfig, ChannelStats, Fault, JournalEntry, Transit, Twin, TwinConfig, TwinState,
+    Channel, ChannelConfig, ChannelStats, Fault, JournalEntry, Orbit, Transit, Twin, TwinConfig, TwinState,
     TwinStats,
 };
 
@@ -26,7 +27,11 @@ const NOISE_DBM: i16 = -125;
 /// Address of everyone.
 const BROADCAST: u16 = 0xFFFF;
 /// A receiver hears a carrier this far from its own: a quarter of 500 kHz (radio.md 8).
-const TUNING_MAX_HZ: u32 = 125_000;
+const TUNING_MAX_HZ: f64 = 125_000.0;
+/// The Doppler shift that the module takes in any case, Hz: a quarter of 125 kHz, the narrower of the two bandwidths that it
+/// may have. At 435 MHz no orbit above 200 km shifts more than 11 kHz, so nothing is lost to it; what is left is the
+/// margin for the oscillators.
+pub const DOPPLER_TOLERANCE_HZ: u32 = 31_250;
 
 /// What is joined.
 #[derive(Clone, Debug)]
@@ -97,6 +102,9 @@ pub struct DeviceStats {
     pub up_half_duplex: u64,
     /// Ground's packets for another address, channel or frequency.
     pub up_not_for_us: u64,
+    /// The largest Doppler shift that a frame had, either way, while the satellite was above the horizon, Hz. To be held
+    /// against [`DOPPLER_TOLERANCE_HZ`]. 0 in a stored profile, which knows of no Doppler.
+    pub doppler_max_hz: u32,
 }
 
 /// Something on its way. The variants' order does not matter: equal times are kept in order of creation.
@@ -171,10 +179,12 @@ impl Device {
             channel_number,
             frequency_hz,
         } = config;
+        let (now_us, utc_at_zero) = (twin.start_us, twin.utc_at_zero());
+        let twin = Twin::new(twin, state);
         let mut device = Self {
-            now_us: twin.start_us,
-            twin: Twin::new(twin, state),
-            channel: Channel::new(channel),
+            now_us,
+            channel: Channel::new(channel, twin.orbit(), utc_at_zero),
+            twin,
             module: Module::new(model),
             timing,
             satellite_address,
@@ -224,15 +234,24 @@ impl Device {
     }
 
     /// Whether the satellite is above the horizon.
-    #[must_use]
-    pub fn in_view(&self, now_us: u64) -> bool {
-        self.channel.config().passes.in_view(now_us)
+    pub fn in_view(&mut self, now_us: u64) -> bool {
+        self.channel.sky_mut().in_view(now_us)
     }
 
     /// The next moment at which [`Device::in_view`] changes; `None` if it never does.
-    #[must_use]
-    pub fn next_view_change_us(&self, now_us: u64) -> Option<u64> {
-        self.channel.config().passes.next_change_us(now_us)
+    pub fn next_view_change_us(&mut self, now_us: u64) -> Option<u64> {
+        self.channel.sky_mut().next_change_us(now_us)
+    }
+
+    /// The satellite flies another orbit from now on: its telemetry and its passes follow the new elements.
+    pub fn set_orbit(&mut self, orbit: Orbit) {
+        self.channel.sky_mut().exchange(&orbit);
+        self.twin.set_orbit(orbit);
+    }
+
+    /// Why the elements have no state any more, told once: from then on the satellite is below the horizon.
+    pub fn take_orbit_fault(&mut self) -> Option<PropagationError> {
+        self.channel.sky_mut().take_fault()
     }
 
     /// What was done so far.
@@ -303,10 +322,11 @@ impl Device {
             Some(ModelOutput::AirSent { start_us, end_us, target, channel, frequency_hz, packet }) => {
                 self.stats.ground_packets += 1;
                 self.stats.airtime_up_us += end_us.saturating_sub(start_us);
+                let (delay_us, shift_hz) = self.across(start_us, frequency_hz);
+                let off_hz = f64::from(frequency_hz) + shift_hz - f64::from(self.frequency_hz);
                 let is_for_us = (target == self.satellite_address || target == BROADCAST)
                     && channel == self.channel_number
-                    && frequency_hz.abs_diff(self.frequency_hz) <= TUNING_MAX_HZ;
-                let delay_us = self.channel.delay_us(start_us);
+                    && off_hz.abs() <= TUNING_MAX_HZ;
                 self.outbox.push_back(DeviceOutput::Journal(JournalEntry::GroundRadiated {
                     at_us: start_us,
                     end_us,
@@ -374,7 +394,7 @@ impl Device {
     }
 
     fn radiate(&mut self, start_us: u64, end_us: u64, frame: &[u8]) {
-        let delay_us = self.channel.delay_us(start_us);
+        let (delay_us, _) = self.across(start_us, self.frequency_hz);
         let (start_us, end_us) = (start_us + delay_us, end_us + delay_us);
         let Transit::Received(reception) = self.channel.down(end_us, frame) else { return };
         if let Some(noise) = reception.noise_before {
@@ -384,6 +404,16 @@ impl Device {
         }
         let heard = Event::DownHeard { start_us, bytes: reception.bytes, rssi_dbm: reception.rssi_dbm };
         self.schedule(end_us, heard);
+    }
+
+    /// What the way between satellite and ground does to a carrier now: how long light takes, µs, and the shift, Hz.
+    fn across(&mut self, now_us: u64, frequency_hz: u32) -> (u64, f64) {
+        let look = self.channel.sky_mut().look(now_us);
+        let shift_hz = downlink_shift_hz(frequency_hz.into(), look.range_rate_km_s);
+        if look.elevation_deg >= 0.0 {
+            self.stats.doppler_max_hz = self.stats.doppler_max_hz.max(shift_hz.abs().round() as u32);
+        }
+        (look.delay_us(), shift_hz)
     }
 
     fn schedule(&mut self, at_us: u64, event: Event) {

@@ -4,7 +4,9 @@
 //! | --- | --- |
 //! | [`Twin`] | the flight software: requests of the ICD in, frames out, in the ICD's order of checks |
 //! | [`Channel`] | the air: losses, bursts, flipped bits, cut frames, strength, all seeded |
-//! | [`PassProfile`] | when the satellite is above the horizon, and how high |
+//! | [`PassProfile`] | how it is decided when the satellite is above the horizon: by its orbit, or by stored passes |
+//! | [`Orbit`] | what it flies: elements, given or made up for the start |
+//! | [`Sky`] | whether it is up now, how high, how far, and when that changes |
 //! | [`Device`] | twin, channel and the ground's radio module joined: what the far end of a serial port is |
 //! | [`JournalEntry`] | what happened, a line each; [`TwinState`] is rebuilt from it |
 //! | [`picture`] | the JPEG the camera takes |
@@ -12,8 +14,7 @@
 //! Everything is stepped and seeded: the same calls give the same bytes. A year costs seconds.
 //!
 //! What this crate does **not** do: it has no clock, no threads, no I/O; it does not make the journal durable (whoever
-//! takes [`DeviceOutput::Journal`] does, before asking for more); it propagates no orbital elements; it knows nothing
-//! of the ground's engine. Its attitude, power and sensors are plausible, not a model of the real satellite.
+//! takes [`DeviceOutput::Journal`] does, before asking for more); it knows nothing of the ground's engine. Its attitude, power and sensors are plausible, not a model of the real satellite.
 //!
 //! ```
 //! use protocol::{Counter, DownFrame, Downlink, Key, Nonce, RequestTag, Telecommand, seal};
@@ -41,7 +42,9 @@ mod noise;
 mod orbit;
 mod passes;
 pub mod picture;
+mod place;
 mod replay;
+mod sky;
 mod state;
 mod stats;
 mod store;
@@ -52,10 +55,12 @@ pub use channel::{
     Burst, Channel, ChannelConfig, ChannelStats, LossCause, Reception, Transit, mean_rssi_dbm,
 };
 pub use config::{Camera, Fault, ImageSource, ReplayPolicy, TwinConfig};
-pub use device::{Device, DeviceConfig, DeviceOutput, DeviceStats};
+pub use device::{DOPPLER_TOLERANCE_HZ, Device, DeviceConfig, DeviceOutput, DeviceStats};
 pub use journal::{JournalEntry, JournalError, Refusal};
-pub use passes::{PassProfile, PassShape, delay_us, range_km};
+pub use orbit::Orbit;
+pub use passes::{PassProfile, PassShape, range_km};
 pub use replay::AcceptedNonces;
+pub use sky::{Sky, SkyLook};
 pub use state::{ClockSetting, StateChange, StoredImage, TwinState};
 pub use stats::{RefusalCounts, TwinStats};
 pub use twin::Twin;

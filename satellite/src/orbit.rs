@@ -1,150 +1,180 @@
-//! Where the twin is: a circular, nearly polar orbit of 500 km, the sun and the Earth's field there. Pure functions
-//! of time, plausible rather than exact.
+//! The orbit that the satellite flies: mean elements with SGP4 made ready, given, or made up for the time of the start.
+
+use std::sync::Arc;
+
+use tle::{
+    EarthOrientation, Elements, PropagationError, Propagator, Station, UtcInstant,
+    frames::turn_z,
+    gmst_rad,
+    passes::PassFinder,
+    propagator::{ElementsError, SGP4_EARTH_RADIUS_KM, SGP4_MU_KM3_S2, State},
+};
 
 use crate::{
     noise::{mix, unit},
-    passes::{EARTH_RADIUS_KM, ORBIT_HEIGHT_KM},
-    vector::{Vec3, add, cross, dot, scale, unit_of},
+    vector::unit_of,
 };
 
-/// Gravitational parameter of the Earth, km³/s².
-const MU_KM3_S2: f64 = 398_600.441_8;
+/// Height of the orbits that are made up, km: where CubeSats are put.
+const HEIGHT_KM: f64 = 510.0;
+/// Inclination that makes an orbit of this height sun-synchronous, degrees.
 const INCLINATION_DEG: f64 = 97.4;
-/// Strength of the Earth's dipole at the equator on the ground, T.
-const DIPOLE_T: f64 = 3.12e-5;
-/// A vernal equinox, ms since 1970 UTC (2000-03-20T07:35Z).
-const EQUINOX_MS: f64 = 953_537_700_000.0;
-const YEAR_DAYS: f64 = 365.2422;
-const OBLIQUITY_DEG: f64 = 23.44;
-const DAY_MS: f64 = 86_400_000.0;
+/// How far beside the station an orbit runs that is made up to pass over it, degrees at the Earth's centre: it
+/// culminates at about 75 degrees.
+const ASIDE_DEG: f64 = 1.25;
 
-/// The surroundings of the satellite at one moment. Axes are TEME.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
-    pub(crate) r_teme_km: Vec3,
-    pub(crate) v_teme_km_s: Vec3,
-    /// Unit vector to the sun.
-    pub(crate) sun_teme: Vec3,
-    pub(crate) in_eclipse: bool,
-    /// Magnetic field, T.
-    pub(crate) field_teme_t: Vec3,
-    /// Geographic latitude of the point below, degrees (sphere).
-    pub(crate) latitude_deg: f64,
-    /// Geographic longitude of the point below, degrees, -180..=180.
-    pub(crate) longitude_deg: f64,
+/// An orbit: elements that SGP4 takes, made ready. Cheap to clone.
+///
+/// The satellite's own telemetry and the ground's view of it come from one and the same.
+#[derive(Clone, Debug)]
+pub struct Orbit(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    elements: Elements,
+    finder: PassFinder,
 }
 
-/// The orbit, turned by the seed.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Orbit {
-    node_rad: f64,
-    phase_rad: f64,
+impl PartialEq for Orbit {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.elements == other.0.elements
+    }
 }
 
 impl Orbit {
-    pub(crate) fn new(seed: u64) -> Self {
-        let turn = |key: u64| f64::from(unit(mix(seed) ^ key)) * std::f64::consts::TAU;
-        Self { node_rad: turn(1), phase_rad: turn(2) }
+    /// The orbit of these elements.
+    ///
+    /// # Errors
+    /// Elements that describe no closed orbit.
+    pub fn new(elements: Elements) -> Result<Self, ElementsError> {
+        let finder = PassFinder::new(&elements)?;
+        Ok(Self(Arc::new(Inner { elements, finder })))
     }
 
-    pub(crate) fn at(&self, utc_ms: u64) -> Place {
-        let radius_km = EARTH_RADIUS_KM + ORBIT_HEIGHT_KM;
-        let rate_rad_s = (MU_KM3_S2 / radius_km.powi(3)).sqrt();
-        let period_ms = std::f64::consts::TAU / rate_rad_s * 1000.0;
-        let turns = (utc_ms as f64 % period_ms) / period_ms;
-        let argument = self.phase_rad + turns * std::f64::consts::TAU;
+    /// An orbit that nobody flies: circular, 510 km high, sun-synchronous, turned by the seed, without drag. Its epoch is
+    /// the start of the twin, so that the twin runs at any date.
+    #[must_use]
+    pub fn fictional(seed: u64, epoch: UtcInstant) -> Self {
+        let turn_deg = |key: u64| f64::from(unit(mix(seed) ^ key)) * 360.0;
+        Self::circular(epoch, turn_deg(1), turn_deg(2))
+    }
+
+    /// An orbit that nobody flies, like [`Self::fictional`], on its way north: at the epoch it culminates, about 75 degrees
+    /// high, over the station. No orbit of this kind passes over a place within 7.4 degrees of a pole: there it culminates
+    /// lower.
+    #[must_use]
+    pub fn passing_over(station: &Station, epoch: UtcInstant) -> Self {
         let inclination = INCLINATION_DEG.to_radians();
-        let ascending = [self.node_rad.cos(), self.node_rad.sin(), 0.0];
-        let across = [
-            -self.node_rad.sin() * inclination.cos(),
-            self.node_rad.cos() * inclination.cos(),
-            inclination.sin(),
-        ];
-        let along = |angle: f64| add(scale(ascending, angle.cos()), scale(across, angle.sin()));
-        let up = along(argument);
-        let r_teme_km = scale(up, radius_km);
-        let v_teme_km_s = scale(along(argument + std::f64::consts::FRAC_PI_2), radius_km * rate_rad_s);
-
-        let sun_teme = sun_direction(utc_ms);
-        let towards_sun = dot(r_teme_km, sun_teme);
-        let off_axis = cross(r_teme_km, sun_teme);
-        let in_eclipse = towards_sun < 0.0 && dot(off_axis, off_axis) < EARTH_RADIUS_KM.powi(2);
-
-        // the dipole points south
-        let south = [0.0, 0.0, -1.0];
-        let strength_t = DIPOLE_T * (EARTH_RADIUS_KM / radius_km).powi(3);
-        let field_teme_t = scale(add(scale(up, 3.0 * dot(south, up)), scale(south, -1.0)), strength_t);
-
-        let longitude = up[1].atan2(up[0]) - earth_angle_rad(utc_ms);
-        Place {
-            r_teme_km,
-            v_teme_km_s,
-            sun_teme,
-            in_eclipse,
-            field_teme_t,
-            latitude_deg: up[2].clamp(-1.0, 1.0).asin().to_degrees(),
-            longitude_deg: (longitude.to_degrees() + 180.0).rem_euclid(360.0) - 180.0,
-        }
+        let gmst = gmst_rad(epoch, EarthOrientation::UT1_IS_UTC);
+        let place = unit_of(turn_z(-gmst, station.axes().r_ecef_km));
+        let level = place[0].hypot(place[1]).max(1e-3);
+        // The flight's direction over the station, from north through east, and a step across it.
+        let heading = (inclination.cos() / level).clamp(-1.0, 1.0).asin();
+        let across = heading + std::f64::consts::FRAC_PI_2;
+        let aside = ASIDE_DEG.to_radians();
+        let latitude = place[2].atan2(level) + aside * across.cos();
+        let right_ascension = place[1].atan2(place[0]) + aside * across.sin() / level;
+        let from_node = (latitude.sin() / inclination.sin()).clamp(-1.0, 1.0).asin();
+        let east_of_node = (inclination.cos() * from_node.sin()).atan2(from_node.cos());
+        Self::circular(epoch, (right_ascension - east_of_node).to_degrees(), from_node.to_degrees())
     }
-}
 
-/// Unit vector from the satellite to a place on the ground.
-pub(crate) fn towards_ground(place: &Place, latitude_deg: f64, longitude_deg: f64, utc_ms: u64) -> Vec3 {
-    let latitude = latitude_deg.to_radians();
-    let angle = longitude_deg.to_radians() + earth_angle_rad(utc_ms);
-    let target = [latitude.cos() * angle.cos(), latitude.cos() * angle.sin(), latitude.sin()];
-    unit_of(add(scale(target, EARTH_RADIUS_KM), scale(place.r_teme_km, -1.0)))
-}
+    fn circular(epoch: UtcInstant, raan_deg: f64, from_node_deg: f64) -> Self {
+        const DAY_S: f64 = 86_400.0;
+        let axis_km = SGP4_EARTH_RADIUS_KM + HEIGHT_KM;
+        let rate_rad_s = (SGP4_MU_KM3_S2 / axis_km.powi(3)).sqrt();
+        let elements = Elements {
+            name: Some("FICTIONAL CUBESAT".to_owned()),
+            object_id: None,
+            norad_cat_id: None,
+            epoch,
+            mean_motion_rev_day: rate_rad_s * DAY_S / std::f64::consts::TAU,
+            eccentricity: 0.0005,
+            inclination_deg: INCLINATION_DEG,
+            raan_deg: raan_deg.rem_euclid(360.0),
+            arg_of_perigee_deg: 0.0,
+            mean_anomaly_deg: from_node_deg.rem_euclid(360.0),
+            bstar: 0.0,
+            mean_motion_dot: 0.0,
+            mean_motion_ddot: 0.0,
+            ephemeris_type: Some(0),
+            classification: Some('U'),
+            element_set_no: None,
+            rev_at_epoch: None,
+            further: Vec::new(),
+        };
+        #[expect(clippy::expect_used, reason = "a circle of constant size, whatever the angles")]
+        Self::new(elements).expect("a closed orbit")
+    }
 
-fn sun_direction(utc_ms: u64) -> Vec3 {
-    let years = (utc_ms as f64 - EQUINOX_MS) / DAY_MS / YEAR_DAYS;
-    let longitude = years.fract() * std::f64::consts::TAU;
-    let obliquity = OBLIQUITY_DEG.to_radians();
-    [longitude.cos(), longitude.sin() * obliquity.cos(), longitude.sin() * obliquity.sin()]
-}
+    /// The elements.
+    #[must_use]
+    pub fn elements(&self) -> &Elements {
+        &self.0.elements
+    }
 
-/// Turn of the Earth since the vernal equinox stood over Greenwich, rad (Earth rotation angle, IERS).
-fn earth_angle_rad(utc_ms: u64) -> f64 {
-    const J2000_MS: f64 = 946_728_000_000.0;
-    let days = (utc_ms as f64 - J2000_MS) / DAY_MS;
-    (0.779_057_273_264 + 1.002_737_811_911_354_5 * days).fract() * std::f64::consts::TAU
+    /// The same elements under another name: what a configuration calls the satellite.
+    #[must_use]
+    pub fn named(self, name: &str) -> Self {
+        let elements = Elements { name: Some(name.to_owned()), ..self.0.elements.clone() };
+        Self(Arc::new(Inner { elements, finder: self.0.finder.clone() }))
+    }
+
+    pub(crate) fn finder(&self) -> &PassFinder {
+        &self.0.finder
+    }
+
+    /// Where it is, by SGP4.
+    pub(crate) fn at(&self, at: UtcInstant) -> Result<State, PropagationError> {
+        self.propagator().at(at)
+    }
+
+    fn propagator(&self) -> &Propagator {
+        self.0.finder.propagator()
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use tle::passes::PassSearch;
+
     use super::*;
-    use crate::vector::length;
 
-    const NOW_MS: u64 = 1_790_000_000_000;
+    /// 2026, 2036, 2099.
+    const STARTS_S: [i64; 3] = [1_790_000_000, 2_100_000_000, 4_090_000_000];
+
+    fn start(index: usize) -> UtcInstant {
+        UtcInstant::from_unix_us(STARTS_S[index] * 1_000_000)
+    }
 
     #[test]
-    fn position_and_velocity_are_those_of_a_circular_orbit() {
-        let orbit = Orbit::new(7);
-        for minute in 0..200_u64 {
-            let at_ms = NOW_MS + minute * 60_000;
-            let (here, soon) = (orbit.at(at_ms), orbit.at(at_ms + 100));
-            assert!((length(here.r_teme_km) - 6_871.0).abs() < 1e-6);
-            assert!((length(here.v_teme_km_s) - 7.6166).abs() < 1e-3);
-            let moved = scale(add(soon.r_teme_km, scale(here.r_teme_km, -1.0)), 10.0);
-            assert!(length(add(moved, scale(here.v_teme_km_s, -1.0))) < 0.01, "minute {minute}");
+    fn a_made_up_orbit_passes_over_its_station_at_its_epoch() {
+        for (index, &(latitude_deg, longitude_deg)) in
+            [(78.2, 15.4), (46.5, 6.6), (0.0, -78.0), (-33.9, 151.2), (-77.8, 166.7)].iter().enumerate()
+        {
+            let station = Station::new(latitude_deg, longitude_deg, 100.0).unwrap();
+            let epoch = start(index % 3);
+            let orbit = Orbit::passing_over(&station, epoch);
+            let search = PassSearch::new(epoch.plus_seconds(-900.0), epoch.plus_seconds(900.0), 0.0);
+            let found = orbit.finder().find(&[station], &search).unwrap();
+            let [pass] = &found.stations[0][..] else { unreachable!("one pass: {latitude_deg}") };
+            assert!((68.0..82.0).contains(&pass.tca.look.elevation_deg), "{latitude_deg}: {pass:?}");
+            assert!(pass.tca.at.seconds_since(epoch).abs() < 15.0, "{latitude_deg}: {pass:?}");
         }
     }
 
     #[test]
-    fn there_is_day_and_night_and_a_field_of_the_right_size() {
-        let orbit = Orbit::new(3);
-        let places: Vec<Place> = (0..95).map(|minute| orbit.at(NOW_MS + minute * 60_000)).collect();
-        assert!(places.iter().any(|place| !place.in_eclipse));
-        for place in &places {
-            assert!((2.0e-5..6.0e-5).contains(&length(place.field_teme_t)));
-            assert!((length(place.sun_teme) - 1.0).abs() < 1e-9);
-            assert!(place.latitude_deg.abs() < 83.0 && place.longitude_deg.abs() <= 180.0);
+    fn made_up_orbits_stay_510_km_high_for_a_year_and_differ_by_seed() {
+        for seed in 0..3 {
+            let epoch = start(seed as usize);
+            let orbit = Orbit::fictional(seed, epoch);
+            for hour in 0..8_760 {
+                let state = orbit.at(epoch.plus_seconds(f64::from(hour) * 3_600.0)).unwrap();
+                let height_km = crate::vector::length(state.r_teme_km) - SGP4_EARTH_RADIUS_KM;
+                assert!((490.0..530.0).contains(&height_km), "{height_km} km after {hour} h");
+            }
         }
-    }
-
-    #[test]
-    fn the_sun_stands_north_in_june() {
-        let june_2026_ms = 1_782_000_000_000;
-        assert!(sun_direction(june_2026_ms)[2] > 0.39);
+        assert_ne!(Orbit::fictional(1, start(0)), Orbit::fictional(2, start(0)));
+        assert_eq!(Orbit::fictional(1, start(0)), Orbit::fictional(1, start(0)));
     }
 }

@@ -1,14 +1,15 @@
-//! When the satellite stands above the ground station's horizon, and how high: a stored profile of passes.
+//! When the satellite stands above the ground station's horizon, and how high: by its orbit, or by a stored profile of
+//! passes.
 //!
-//! The shape of a pass is that of a circular orbit of 500 km over a sphere, so elevation and range rise and fall as
-//! they do in life; only the times are stored instead of computed from orbital elements.
+//! The shape of a stored pass is that of a circular orbit of 500 km over a sphere, so elevation and range rise and fall as
+//! they do in life; only the times are stored instead of computed from orbital elements. [`crate::Sky`] answers for both.
+
+use tle::{EarthOrientation, Station};
 
 /// Mean radius of the Earth, km (IUGG).
-pub(crate) const EARTH_RADIUS_KM: f64 = 6371.0;
+const EARTH_RADIUS_KM: f64 = 6371.0;
 /// Height of the circular orbit, km.
-pub(crate) const ORBIT_HEIGHT_KM: f64 = 500.0;
-/// Speed of light, km/s.
-const LIGHT_KM_S: f64 = 299_792.458;
+const ORBIT_HEIGHT_KM: f64 = 500.0;
 /// What a station sees of a satellite far below its horizon, degrees.
 const BELOW_DEG: f64 = -90.0;
 
@@ -37,6 +38,13 @@ pub enum PassProfile {
         period_us: u64,
         /// The shapes in turn. With none the satellite is never in view.
         passes: Vec<PassShape>,
+    },
+    /// As the satellite's orbit ([`crate::Orbit`]) says, seen from a place on Earth.
+    Orbit {
+        /// The place, and what its horizon hides.
+        station: Box<Station>,
+        /// How far the Earth has turned.
+        orientation: EarthOrientation,
     },
 }
 
@@ -71,30 +79,33 @@ struct InPass {
 }
 
 impl PassProfile {
-    /// Elevation above the horizon at this time, degrees; -90 between passes.
+    /// The orbit as seen from here, with UT1 taken as UTC.
     #[must_use]
-    pub fn elevation_deg(&self, now_us: u64) -> f64 {
+    pub fn seen_from(station: Station) -> Self {
+        Self::Orbit { station: Box::new(station), orientation: EarthOrientation::UT1_IS_UTC }
+    }
+
+    /// Elevation above the horizon at this time by what is stored, degrees; -90 between passes.
+    pub(crate) fn elevation_deg(&self, now_us: u64) -> f64 {
         match self {
             Self::Always { elevation_deg } => *elevation_deg,
-            Self::Repeating { .. } => match self.pass_at(now_us) {
+            Self::Repeating { .. } | Self::Orbit { .. } => match self.pass_at(now_us) {
                 Some(pass) => pass_elevation_deg(&pass),
                 None => BELOW_DEG,
             },
         }
     }
 
-    /// Whether the satellite is above the horizon.
-    #[must_use]
-    pub fn in_view(&self, now_us: u64) -> bool {
+    /// Whether the satellite is above the horizon by what is stored.
+    pub(crate) fn in_view(&self, now_us: u64) -> bool {
         match self {
             Self::Always { elevation_deg } => *elevation_deg >= 0.0,
-            Self::Repeating { .. } => self.pass_at(now_us).is_some(),
+            Self::Repeating { .. } | Self::Orbit { .. } => self.pass_at(now_us).is_some(),
         }
     }
 
     /// The next moment after `now_us` at which [`Self::in_view`] changes; `None` if it never does.
-    #[must_use]
-    pub fn next_change_us(&self, now_us: u64) -> Option<u64> {
+    pub(crate) fn next_change_us(&self, now_us: u64) -> Option<u64> {
         let Self::Repeating { first_aos_us, period_us, passes } = self else { return None };
         if passes.is_empty() {
             return None;
@@ -132,12 +143,6 @@ pub fn range_km(elevation_deg: f64) -> f64 {
     let orbit_km = EARTH_RADIUS_KM + ORBIT_HEIGHT_KM;
     let along = EARTH_RADIUS_KM * sin_elevation;
     (along * along + orbit_km * orbit_km - EARTH_RADIUS_KM * EARTH_RADIUS_KM).sqrt() - along
-}
-
-/// How long light takes over [`range_km`], microseconds.
-#[must_use]
-pub fn delay_us(elevation_deg: f64) -> u64 {
-    (range_km(elevation_deg) / LIGHT_KM_S * 1e6) as u64
 }
 
 /// Elevation within a pass: the satellite runs along a great circle that comes within `nearest` (the Earth's
@@ -187,6 +192,10 @@ mod tests {
     fn range_and_delay_agree_with_the_link_budget() {
         assert!((range_km(90.0) - 500.0).abs() < 1.0);
         assert!((range_km(5.0) - 2078.0).abs() < 5.0);
+        let delay_us = |elevation_deg| {
+            crate::SkyLook { elevation_deg, range_km: range_km(elevation_deg), range_rate_km_s: 0.0 }
+                .delay_us()
+        };
         assert!((1_600..1_800).contains(&delay_us(90.0)));
         assert!((6_800..7_000).contains(&delay_us(5.0)));
     }

@@ -19,6 +19,7 @@ use self::{
 use crate::{
     Fault, ImageSource, JournalEntry, Refusal, StateChange, TwinConfig, TwinState, TwinStats,
     body::{Body, Reading},
+    orbit::Orbit,
     store::{Image, NO_IMAGE},
 };
 
@@ -77,8 +78,10 @@ impl Twin {
         let mut faults: Vec<(u64, Fault)> = config.faults.clone();
         faults.sort_by_key(|(at_us, _)| *at_us);
         let now_us = config.start_us;
+        let orbit = config.orbit.clone();
+        let orbit = orbit.unwrap_or_else(|| Orbit::fictional(config.seed, config.utc_at_zero()));
         let mut twin = Self {
-            body: Body::new(config.seed, now_us),
+            body: Body::new(config.seed, now_us, orbit),
             image: None,
             stats: TwinStats::default(),
             journal: VecDeque::new(),
@@ -199,6 +202,17 @@ impl Twin {
     #[must_use]
     pub fn config(&self) -> &TwinConfig {
         &self.config
+    }
+
+    /// The orbit it flies.
+    #[must_use]
+    pub fn orbit(&self) -> &Orbit {
+        self.body.orbit()
+    }
+
+    /// It flies another orbit from now on. What the flight software stores as its elements is another matter.
+    pub fn set_orbit(&mut self, orbit: Orbit) {
+        self.body.set_orbit(orbit);
     }
 
     /// When the next heartbeat is due.
