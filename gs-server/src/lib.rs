@@ -11,6 +11,7 @@
 //! | [`clock`] | the machine's clock and simulated ones; the only place that reads time or sets a timer |
 //! | [`config`] | one TOML file, a struct per section |
 //! | [`lifecycle`] | how tasks live and die |
+//! | [`sky`] | elements to passes, looks, plots and calendars |
 //! | [`keys`], [`decode`] | key files; captures to JSON |
 //! | [`twin`], [`demo`] | the simulated satellite behind a real port; a pass with everything real but the satellite |
 //! | [`cli`] | the command line, a file per verb |
@@ -30,6 +31,7 @@ pub mod keys;
 pub mod lifecycle;
 pub mod links;
 pub mod run;
+pub mod sky;
 pub mod storage;
 pub mod twin;
 pub mod witness;

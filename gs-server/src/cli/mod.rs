@@ -8,10 +8,13 @@ mod decode;
 mod demo;
 mod failure;
 mod key;
+mod look;
+mod passes;
 mod radio;
 mod redecode;
 mod serve;
 mod shell;
+mod sky;
 mod twin;
 
 pub use failure::{Exit, Failure};
@@ -65,6 +68,10 @@ pub enum Command {
     Twin(twin::Twin),
     /// Decode a capture: frames in, JSON out; no key needed
     Decode(decode::Decode),
+    /// Passes of satellites over stations, from a file of elements
+    Passes(passes::Passes),
+    /// Where satellites stand at instants, from a file of elements
+    Look(look::Look),
     /// The radio module by hand
     #[command(subcommand)]
     Radio(radio::Radio),
@@ -101,6 +108,8 @@ impl Cli {
             Command::Demo(demo) => demo.run(),
             Command::Twin(twin) => twin.run(),
             Command::Decode(decode) => decode.run(),
+            Command::Passes(passes) => passes.run(),
+            Command::Look(look) => look.run(),
             Command::Radio(radio) => radio.run(),
             Command::Key(key) => key.run(),
             Command::Redecode(redecode) => redecode.run(),

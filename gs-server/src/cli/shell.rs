@@ -29,6 +29,15 @@ pub(super) fn print_line(line: impl std::fmt::Display) -> Result<(), Failure> {
         .map_err(|error| Failure::doing("standard output cannot be written", error))
 }
 
+/// Writes text to standard output, at once.
+pub(super) fn print_text(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .or_else(quiet_pipe)
+        .map_err(|error| Failure::doing("standard output cannot be written", error))
+}
+
 /// Whoever reads us has seen enough (`| head`): not an error.
 pub(super) fn quiet_pipe(error: io::Error) -> io::Result<()> {
     if error.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(error) }
