@@ -65,15 +65,10 @@ impl Propagator {
         )
         .map_err(|_| ElementsError::MeanMotion { found_rev_day: elements.mean_motion_rev_day })?;
         let period_min = std::f64::consts::TAU / orbit.mean_motion;
-        let (days, fraction) = elements.epoch.days_since_j2000();
-        // One f64 of a Julian date, as the AFSPC's code has it: it rounds the epoch to 40 us for the places of Sun and
-        // Moon (not for the time since epoch), and without it far orbits differ from the reference by millimetres.
-        let j2000 = 2_451_545.0;
-        let afspc_days = (j2000 + days + fraction) - j2000;
         let constants = sgp4::Constants::new(
             sgp4::WGS72,
             sgp4::afspc_epoch_to_sidereal_time,
-            afspc_days / 365.25,
+            afspc_days_since_j2000(elements.epoch) / 365.25,
             elements.bstar,
             orbit,
         )
@@ -140,6 +135,15 @@ impl Propagator {
         }
         Ok(State { r_teme_km: prediction.position, v_teme_km_s: prediction.velocity })
     }
+}
+
+/// Days from J2000 to an epoch, by way of one f64 of a Julian date, as the AFSPC's code has it: it rounds the epoch to 40 us
+/// for the places of Sun and Moon (not for the time since epoch), and without it far orbits differ from the reference by
+/// millimetres.
+pub(crate) fn afspc_days_since_j2000(epoch: UtcInstant) -> f64 {
+    let (days, fraction) = epoch.days_since_j2000();
+    let j2000 = 2_451_545.0;
+    (j2000 + days + fraction) - j2000
 }
 
 /// Elements from which no orbit can be made.

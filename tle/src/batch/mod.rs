@@ -1,12 +1,13 @@
-//! Near-earth SGP4 for many instants or many objects at once, in the lanes of the machine's vector unit.
+//! SGP4 for many instants or many objects at once, in the lanes of the machine's vector unit.
 //!
-//! The same theory as [`Propagator`](crate::Propagator) (WGS72, the 2006 revision), written without branches for orbits
-//! with a period below 225 minutes; round ones (eccentricity below [`ECCENTRICITY_BOUND`]) take the shortest way.
-//! It differs from the scalar path by less than 0.1 mm over a week on either side of the epoch, and costs a tenth or
-//! less. Widest vectors first (AVX-512, AVX2, SSE, NEON), chosen when the program runs.
+//! The same theory as [`Propagator`](crate::Propagator) (WGS72, the 2006 revision), written without branches. Round
+//! near-earth orbits (eccentricity below [`ECCENTRICITY_BOUND`]), nine of ten objects in the sky, take the shortest way;
+//! eccentric ones more steps of Kepler's equation; [`DeepSpace`] adds Sun, Moon and resonance. It differs from the scalar
+//! path by less than 0.1 mm over a week on either side of the epoch, and costs a tenth or less. Widest vectors first
+//! (AVX-512, AVX2, SSE, NEON), chosen when the program runs.
 //!
-//! What it does not do: deep space, and error codes. A state that the theory refuses, or that leaves
-//! the range for which these formulas were cut, is NaN in all six columns; the scalar path then tells why.
+//! What it does not do: error codes. A state that the theory refuses, or that leaves the range for which these formulas
+//! were cut, is NaN in all six columns; the scalar path then tells why.
 //!
 //! ```
 //! # use tle::{Elements, UtcInstant, batch::{NearEarth, StateColumns}};
@@ -22,13 +23,18 @@
 
 mod coefficients;
 mod columns;
+mod deep_space;
 mod fleet;
 mod kepler;
 mod kernel;
 mod near_earth;
+mod resonance;
+mod third_body;
 mod trig;
 
 pub use coefficients::ECCENTRICITY_BOUND;
 pub use columns::StateColumns;
+pub use deep_space::DeepSpace;
 pub use fleet::Fleet;
 pub use near_earth::NearEarth;
+pub use resonance::Anchors;

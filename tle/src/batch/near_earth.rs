@@ -15,7 +15,7 @@ pub struct NearEarth {
 }
 
 impl NearEarth {
-    /// Makes it ready. `None` for a period of 225 minutes or more, and for elements
+    /// Makes it ready. `None` for a period of 225 minutes or more (see [`DeepSpace`](super::DeepSpace)), and for elements
     /// that describe no orbit.
     #[must_use]
     pub fn new(elements: &Elements) -> Option<Self> {

@@ -1,6 +1,7 @@
 //! One object's motion over the turning Earth, by seconds since the window began.
 
-use crate::batch::{NearEarth, StateColumns};
+use crate::batch::{Anchors, DeepSpace, NearEarth, StateColumns};
+use crate::elements::Elements;
 use crate::frames::{EarthFixed, ecef_from_teme, gmst_rad};
 use crate::gravity::gravity_km_s2;
 use crate::propagator::{PropagationError, Propagator, SGP4_MU_KM3_S2, State};
@@ -36,11 +37,32 @@ impl EarthTurn {
     }
 }
 
+/// The theory in vector lanes.
+#[derive(Debug, Clone)]
+pub(super) enum Lanes {
+    NearEarth(Box<NearEarth>),
+    DeepSpace(Box<DeepSpace>),
+}
+
+impl Lanes {
+    /// `None` for elements that describe no orbit.
+    pub(super) fn new(elements: &Elements) -> Option<Self> {
+        NearEarth::new(elements)
+            .map(|near| Self::NearEarth(Box::new(near)))
+            .or_else(|| DeepSpace::new(elements).map(|deep| Self::DeepSpace(Box::new(deep))))
+    }
+
+    fn is_round(&self) -> bool {
+        matches!(self, Self::NearEarth(orbit) if orbit.is_round())
+    }
+}
+
 /// True states of one object; counts how many it was asked for.
 #[derive(Debug)]
 pub(super) struct Motion<'a> {
     propagator: &'a Propagator,
-    lanes: Option<&'a NearEarth>,
+    lanes: Option<&'a Lanes>,
+    anchors: Anchors,
     origin_min: f64,
     turn: EarthTurn,
     minutes: Vec<f64>,
@@ -52,13 +74,14 @@ pub(super) struct Motion<'a> {
 impl<'a> Motion<'a> {
     pub(super) fn new(
         propagator: &'a Propagator,
-        lanes: Option<&'a NearEarth>,
+        lanes: Option<&'a Lanes>,
         origin: UtcInstant,
         orientation: EarthOrientation,
     ) -> Self {
         Self {
             propagator,
             lanes,
+            anchors: Anchors::default(),
             origin_min: origin.minutes_since(propagator.epoch()),
             turn: EarthTurn::new(origin, orientation),
             minutes: Vec::new(),
@@ -69,7 +92,7 @@ impl<'a> Motion<'a> {
 
     /// Whether the orbit is near the Earth and nearly circular, so that its velocities are good.
     pub(super) fn is_round(&self) -> bool {
-        self.lanes.is_some_and(NearEarth::is_round)
+        self.lanes.is_some_and(Lanes::is_round)
     }
 
     /// Seconds from the epoch of the elements to the origin.
@@ -115,8 +138,7 @@ impl<'a> Motion<'a> {
         ecef_from_teme(state, self.turn.gmst_rad(t_s))
     }
 
-    /// Many states in TEME, handed to `take` with their number. In vector lanes where the orbit allows it; a state that the
-    /// lanes refuse is asked of the scalar path, which knows the reason.
+    /// Many states in TEME, handed to `take` with their number. In vector lanes; a state that the lanes refuse is asked of the scalar path, which knows the reason.
     pub(super) fn many_teme(
         &mut self,
         times_s: &[f64],
@@ -127,7 +149,10 @@ impl<'a> Motion<'a> {
             let mut columns = std::mem::take(&mut self.columns);
             minutes.clear();
             minutes.extend(times_s.iter().map(|t_s| self.origin_min + t_s / 60.0));
-            lanes.propagate(&minutes, &mut columns);
+            match lanes {
+                Lanes::NearEarth(orbit) => orbit.propagate(&minutes, &mut columns),
+                Lanes::DeepSpace(orbit) => orbit.propagate(&minutes, &mut self.anchors, &mut columns),
+            }
             self.calls += times_s.len() as u64;
             for (index, &t_s) in times_s.iter().enumerate() {
                 let state = match columns.get(index) {

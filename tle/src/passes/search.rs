@@ -1,6 +1,5 @@
 //! The search over one satellite and its stations.
 
-use crate::batch::NearEarth;
 use crate::elements::Elements;
 use crate::frames::EarthFixed;
 use crate::look::LookAngles;
@@ -11,7 +10,7 @@ use crate::vector::dot;
 
 use super::grid::{Block, Grid, OrbitShape, Reach};
 use super::horizon;
-use super::motion::Motion;
+use super::motion::{Lanes, Motion};
 use super::pass::{EndCause, GAPS_MAX, Gap, Pass, PassEnd, PassPoint, SatellitePasses};
 use super::refine::{
     Place, SUMMIT_OFFSET_S, crossing_from, sine_elevation, step_to_crossing, step_to_summit, summit,
@@ -28,7 +27,7 @@ const BEYOND_REVOLUTIONS: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub struct PassFinder {
     propagator: Propagator,
-    lanes: Option<NearEarth>,
+    lanes: Option<Lanes>,
     mean_anomaly_rad: f64,
 }
 
@@ -62,7 +61,7 @@ impl PassFinder {
     pub fn new(elements: &Elements) -> Result<Self, ElementsError> {
         Ok(Self {
             propagator: Propagator::new(elements)?,
-            lanes: NearEarth::new(elements),
+            lanes: Lanes::new(elements),
             mean_anomaly_rad: elements.mean_anomaly_deg.to_radians(),
         })
     }
