@@ -37,7 +37,7 @@ pub struct Demo {
     speed: Option<f64>,
     #[command(flatten)]
     sky: Sky,
-    /// Whether the satellite passes every 95 minutes, or stands in the sky always
+    /// Whether the satellite passes over a northern station in each revolution, or stands in the sky always
     #[arg(long, value_enum, default_value_t = Mode::Passes)]
     mode: Mode,
     /// Port of the page on loopback; 0 takes any
@@ -67,11 +67,15 @@ impl Demo {
     pub(super) fn run(self) -> Result<Exit, Failure> {
         let data = Data::new(self.data.clone())?;
         let until_image = self.until == Some(Until::Image);
+        let passes = match self.mode {
+            Mode::Always => self.mode.passes(),
+            Mode::Passes => demo::passes().map_err(Failure::failed)?,
+        };
         let options = DemoOptions {
             data: data.path.clone(),
             speed: self.speed.or((!until_image).then_some(WATCHING_SPEED)),
             seed: self.sky.seed,
-            channel: self.sky.channel(self.mode),
+            channel: self.sky.channel(passes),
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, self.port)),
             until_image,
             limit_us: self.limit_h * 3_600_000_000,

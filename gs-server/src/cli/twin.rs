@@ -12,6 +12,7 @@ use satellite::{
     ChannelConfig, Device, DeviceConfig, Fault, ImageSource, PassProfile, ReplayPolicy, TwinConfig,
 };
 use serde::Serialize;
+use tle::UtcInstant;
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 
@@ -19,7 +20,8 @@ use super::shell::{fill_random, print_json, print_line, runtime, stop_on_signals
 use super::{Exit, Failure};
 use crate::clock::{ScaledClock, Timer};
 use crate::keys;
-use crate::twin::{End, JournalFile, Player, Pty, Replayed, TcpEnd, TwinError};
+use crate::sky::Place;
+use crate::twin::{End, JournalFile, OrbitError, Player, Pty, Replayed, TcpEnd, TwinError, orbit_from};
 
 /// `gs-server twin`.
 #[derive(Debug, Subcommand)]
@@ -30,6 +32,8 @@ Examples:
   gs-server twin serve --pty /tmp/radio --journal twin.journal
   gs-server twin serve --tcp 127.0.0.1:5010 --journal twin.journal --loss 0.2 --seed 7
   gs-server twin serve --pty /tmp/radio --journal twin.journal --speed 20 --mode passes
+  gs-server twin serve --pty /tmp/radio --journal twin.journal --elements cubesats.json --satellite 25544 \
+      --station 46.5191,6.5668,410
 
 Ground opens the port as if the radio module hung on it: 9600 baud, mode_pins = \"software\" or
 \"strapped\", aux = \"absent\". The journal is the satellite's memory, its counters included, and the
@@ -60,6 +64,15 @@ pub struct Serve {
     /// Whether the satellite stands in the sky always, or passes every 95 minutes
     #[arg(long, value_enum, default_value_t = Mode::Always)]
     mode: Mode,
+    /// Fly these elements (OMM or TLE), and be in view when they say so
+    #[arg(long, value_name = "FILE", requires = "station", conflicts_with = "mode")]
+    elements: Option<PathBuf>,
+    /// The place that sees the satellite: degrees north, degrees east, metres above the ellipsoid
+    #[arg(long, value_name = "LAT,LON,HEIGHT_M", requires = "elements", allow_hyphen_values = true)]
+    station: Option<Place>,
+    /// Which satellite of FILE, by name, catalogue number or designator
+    #[arg(long = "satellite", value_name = "NAME", requires = "elements")]
+    object: Option<String>,
     /// One JSON object when ready, one at the end
     #[arg(long)]
     json: bool,
@@ -176,13 +189,13 @@ impl Mode {
 
 impl Sky {
     /// The channel under this sky.
-    pub(super) fn channel(&self, mode: Mode) -> ChannelConfig {
+    pub(super) fn channel(&self, passes: PassProfile) -> ChannelConfig {
         ChannelConfig {
             seed: self.seed,
             loss: self.loss,
             flips: self.flips,
-            passes: mode.passes(),
-            elevation_loss: mode == Mode::Passes,
+            elevation_loss: !matches!(passes, PassProfile::Always { .. }),
+            passes,
             ..ChannelConfig::default()
         }
     }
@@ -254,6 +267,15 @@ impl Serve {
         let (timer, start_us, zero_us) = begin(&replayed, self.speed);
 
         let mut twin = self.satellite.config(self.sky.seed, key.key.clone())?;
+        let passes = match (&self.elements, &self.station) {
+            (Some(file), Some(place)) => {
+                let at = UtcInstant::from_unix_us(UtcUs(zero_us).plus(start_us.cast_signed()).0);
+                let orbit = orbit_from(file, self.object.as_deref(), at).map_err(orbit_failure)?;
+                twin.orbit = Some(orbit);
+                PassProfile::seen_from(place.station.clone())
+            }
+            _ => self.mode.passes(),
+        };
         twin.start_us = start_us;
         twin.utc_at_zero_ms = (zero_us / 1000).cast_unsigned();
         twin.faults = self.satellite.faults.iter().map(|fault| (start_us + fault.0, fault.1)).collect();
@@ -261,7 +283,7 @@ impl Serve {
         let (boots, counter) = (replayed.state.boots, replayed.state.nonces.highest());
         let device = Device::new(DeviceConfig {
             state: replayed.state,
-            ..DeviceConfig::new(twin, self.sky.channel(self.mode), model)
+            ..DeviceConfig::new(twin, self.sky.channel(passes), model)
         });
 
         let end = self.end().await?;
@@ -360,6 +382,13 @@ pub(super) fn simulated_key(path: &Path, may_make: bool) -> Result<keys::KeyFile
         )));
     }
     Ok(key)
+}
+
+fn orbit_failure(error: OrbitError) -> Failure {
+    match error {
+        OrbitError::Choose { .. } | OrbitError::Absent { .. } => Failure::usage(error),
+        _ => Failure::failed(error),
+    }
 }
 
 fn refusal(error: TwinError) -> Failure {

@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | `scene` | the data folder, the twin on its thread, the server |
 //! | `operator` | what an operator would send, through the same door |
-//! | `sky` | tells the engine when the satellite is in view, and skips the time between passes |
+//! | `sky` | when the satellite is in view; skips the time between passes |
 //! | `summary` | what it came to: the one JSON object |
 //!
 //! Nothing of it may touch a real satellite: key, folder and clock are marked as simulated, and real links refuse them.
@@ -27,7 +27,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use mission::{MonoUs, Status};
-use satellite::ChannelConfig;
+use satellite::{ChannelConfig, PassProfile};
+use tle::Station;
+use tle::station::StationError;
 use tokio_util::sync::CancellationToken;
 
 use crate::clock::within;
@@ -53,6 +55,14 @@ pub struct DemoOptions {
     pub until_image: bool,
     /// Then end in vain after so many simulated microseconds.
     pub limit_us: u64,
+}
+
+/// The demo's sky: true passes over a station so far north (Svalbard) that the satellite comes by in each revolution.
+///
+/// # Errors
+/// None with these coordinates; whoever changes them is told.
+pub fn passes() -> Result<PassProfile, StationError> {
+    Ok(PassProfile::seen_from(Station::new(78.23, 15.41, 450.0)?))
 }
 
 /// The demo is set up: where to look.
@@ -187,13 +197,13 @@ async fn direct(
 ) -> Result<Ending, DemoError> {
     let timer = Arc::clone(&scene.timer);
     let mut operator = operator::Operator::new(scene, options.until_image);
-    let mut sky = sky::Sky::new(scene, &options.channel.passes);
+    let mut sky = sky::Sky::new(scene);
     let patience = STALLED.max(Duration::from_secs_f64(10.0 / options.speed.unwrap_or(1.0).min(1.0)));
     // From here on the clock is held by us, or it runs until our next look.
     let mut awake = scene.take_start_token();
     loop {
         let now = timer.now();
-        let in_view = sky.look(now, !options.until_image).await;
+        let in_view = sky.look(now, !options.until_image);
         let status = scene.ready.engine.status();
         progress(&Progress { simulated_s: now.mono.0 as f64 / 1e6, in_view, status: Arc::clone(&status) });
         operator.act(&status, now).await;

@@ -5,9 +5,11 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use mission::{Entropy as _, LinkId, UtcUs};
+use mission::{Entropy as _, Intent, LinkId, Principal, SatelliteId, UtcUs};
 use radio::model::ModelConfig;
-use satellite::{Device, DeviceConfig, TwinConfig};
+use satellite::{Device, DeviceConfig, Orbit, PassProfile, Sky, TwinConfig};
+use sha2::{Digest as _, Sha256};
+use tle::UtcInstant;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio::task;
@@ -27,6 +29,8 @@ use crate::twin::{Ask, End, JournalFile, Player, Pty, TwinError, View};
 const BIRTH_US: i64 = 1_805_544_000_000_000;
 /// A demo that goes on with an older folder begins this long after the last thing that happened in it.
 const PAUSE_US: u64 = 120_000_000;
+/// A new satellite culminates this long after its time began: its first pass begins some twenty seconds after it.
+const FIRST_CULMINATION_US: i64 = 350_000_000;
 
 const CONFIG: &str = r#"
 [station]
@@ -66,6 +70,8 @@ pub(super) struct Scene {
     pub(super) asks: mpsc::Sender<Ask>,
     /// What the satellite's scale showed when the clock showed 0.
     pub(super) start_us: u64,
+    /// The satellite in the station's sky, on its own scale.
+    pub(super) sky: Sky,
     /// Wall time at the beginning.
     pub(super) wall: crate::clock::SystemClock,
     /// The server or the twin has ended.
@@ -102,6 +108,10 @@ impl Scene {
             utc_at_zero_ms: (zero_us / 1000).cast_unsigned(),
             ..TwinConfig::new(options.seed, key.key.clone())
         };
+        let utc_at_zero = twin.utc_at_zero();
+        let orbit = orbit(options, utc_at_zero);
+        let sky = Sky::new(&options.channel.passes, &orbit, utc_at_zero);
+        let twin = TwinConfig { orbit: Some(orbit.clone()), ..twin };
         let device = Device::new(DeviceConfig {
             state: replayed.state,
             ..DeviceConfig::new(twin, options.channel.clone(), ModelConfig::prepared(true))
@@ -117,6 +127,11 @@ impl Scene {
             .map_err(|source| DemoError::Listen { address: options.listen, source })?;
         let mut config = Config::from_toml(CONFIG, &data)?;
         config.links.iter_mut().for_each(|link| link.port = Some(port.display().to_string()));
+        if let PassProfile::Orbit { station, .. } = &options.channel.passes {
+            config.station.latitude_deg = Some(station.latitude_deg());
+            config.station.longitude_deg = Some(station.longitude_deg());
+            config.station.height_m = station.height_m();
+        }
         // The log shows the configuration: the address in it must be the one that answers.
         config.http.listen = listener.local_addr().unwrap_or(options.listen);
         let token_file = config.token_file();
@@ -148,6 +163,9 @@ impl Scene {
                 _ => DemoError::RunDied,
             });
         };
+        if let PassProfile::Orbit { .. } = options.channel.passes {
+            add_elements(&ready, &orbit, start_us).await;
+        }
         let token = Token::load_or_create(&token_file)?;
         let stage = Stage {
             url: format!("http://{}/#token={}", ready.address, token.reveal()),
@@ -164,6 +182,7 @@ impl Scene {
             ready,
             asks,
             start_us,
+            sky,
             wall,
             ended,
             starting,
@@ -205,6 +224,31 @@ impl Scene {
         server?;
         twin.ok_or(DemoError::TwinDied)??;
         Ok(())
+    }
+}
+
+/// What the satellite flies: where the station follows an orbit, one that passes over it soon after the satellite's time
+/// began. The same for all runs in one folder.
+fn orbit(options: &DemoOptions, utc_at_zero: UtcInstant) -> Orbit {
+    match &options.channel.passes {
+        PassProfile::Orbit { station, .. } => {
+            Orbit::passing_over(station, utc_at_zero.plus_us(FIRST_CULMINATION_US)).named("PIXELSAT-1 (DEMO)")
+        }
+        PassProfile::Always { .. } | PassProfile::Repeating { .. } => {
+            Orbit::fictional(options.seed, utc_at_zero)
+        }
+    }
+}
+
+/// Gives the server the elements that the satellite flies, as an operator would. Those of an earlier run it has.
+async fn add_elements(ready: &Ready, orbit: &Orbit, start_us: u64) {
+    let Ok(satellite) = SatelliteId::new("pixelsat-1") else { return };
+    let (elements, source) = (vec![orbit.elements().clone()], "made up by the demo".to_owned());
+    let intent = Intent::AddElements { satellite, elements, source };
+    let key = format!("demo-{start_us}-elements");
+    let digest = Sha256::digest(&key).into();
+    if let Err(error) = ready.engine.intent(Principal::new("demo"), key, digest, intent).await {
+        tracing::warn!("the demo's elements were refused: {error}");
     }
 }
 

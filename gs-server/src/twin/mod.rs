@@ -10,12 +10,14 @@
 
 mod ends;
 mod journal;
+mod orbit;
 mod player;
 mod pty;
 mod tcp;
 
 pub use ends::{End, Heard};
 pub use journal::{JournalFile, Replayed};
+pub use orbit::{OrbitError, orbit_from};
 pub use player::{Ask, Player, View};
 pub use pty::Pty;
 pub use tcp::TcpEnd;

@@ -144,6 +144,12 @@ impl Player {
                 DeviceOutput::Aux { .. } => {}
             }
         }
+        if let Some(fault) = self.device.take_orbit_fault() {
+            tracing::warn!(
+                error = %fault,
+                "the satellite's elements end here: {fault}; it stays below the horizon, start it with newer elements"
+            );
+        }
         Ok(())
     }
 
