@@ -5,6 +5,8 @@
 //! | [`run`] | the server as a function; the order of start and end |
 //! | [`engine`] | the actor that owns the station and carries out what it asks |
 //! | [`links`] | serial ports, TCP connections, recordings: each an actor with the radio driver |
+//! | [`elements`] | where elements come from: operators, and sources that are asked politely |
+//! | [`hamlib`] | rotator and rig behind hamlib's daemons: clients, and the tasks that follow a satellite |
 //! | [`storage`], [`witness`] | the archive, the reserve, and the counters' witness beside them |
 //! | [`hub`] | committed events on their way to watchers |
 //! | [`http`] | API v1, the stream, the first page |
@@ -14,6 +16,7 @@
 //! | [`sky`] | elements to passes, looks, plots and calendars |
 //! | [`keys`], [`decode`] | key files; captures to JSON |
 //! | [`twin`], [`demo`] | the simulated satellite behind a real port; a pass with everything real but the satellite |
+//! | [`plan`] | plans as text: read, checked, templates |
 //! | [`cli`] | the command line, a file per verb |
 //!
 //! What it does **not** do: decide what to send or when (the mission engine does), know the wire format (`protocol`
@@ -24,12 +27,15 @@ pub mod clock;
 pub mod config;
 pub mod decode;
 pub mod demo;
+pub mod elements;
 pub mod engine;
+pub mod hamlib;
 pub mod http;
 pub mod hub;
 pub mod keys;
 pub mod lifecycle;
 pub mod links;
+pub mod plan;
 pub mod run;
 pub mod sky;
 pub mod storage;

@@ -22,6 +22,8 @@ use tokio_util::sync::CancellationToken;
 
 use crate::clock::{ScaledClock, SystemClock, Timer, Wire};
 use crate::config::{Changes, Config, ConfigError, station_config};
+use crate::elements::task::ElementsTask;
+use crate::elements::{Door, ElementsHandle, Fetcher, Wanted};
 use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, OsEntropy};
 use crate::http::{self, AllowedHosts, HttpState, Identity, Token, TokenError};
 use crate::hub::Hub;
@@ -251,7 +253,9 @@ pub async fn run_with(
             Ok(())
         });
     }
+    let elements = elements(&config, &handle, &store, &timer, &api)?;
     let state = HttpState {
+        elements,
         store: store.clone(),
         engine: handle.clone(),
         hub: hub.clone(),
@@ -340,7 +344,7 @@ pub(crate) fn load_keys(config: &Config) -> Result<BTreeMap<String, Key>, RunErr
 
 /// The clock of the configuration. A simulated one that ran ahead of life goes on where the last run left it: to a
 /// restart, records of the future would be answers that are still to come.
-fn clock_for(config: &Config, last: Option<UtcUs>) -> Arc<dyn Timer> {
+pub(crate) fn clock_for(config: &Config, last: Option<UtcUs>) -> Arc<dyn Timer> {
     let Some(simulation) = config.simulation else { return Arc::new(SystemClock::new()) };
     let clock = ScaledClock::new(simulation.speed);
     match last.filter(|last| *last > clock.now().utc) {
@@ -350,7 +354,7 @@ fn clock_for(config: &Config, last: Option<UtcUs>) -> Arc<dyn Timer> {
 }
 
 /// When the newest event of the archive happened. Owns what it reads with, as [`snapshot`] does.
-fn newest_event(store: &Store) -> BoxFuture<'static, Result<Option<UtcUs>, StoreError>> {
+pub(crate) fn newest_event(store: &Store) -> BoxFuture<'static, Result<Option<UtcUs>, StoreError>> {
     let store = store.clone();
     let query = EventQuery {
         page: Page { before: Some(i64::MAX), limit: 1, ..Page::default() },
@@ -359,7 +363,7 @@ fn newest_event(store: &Store) -> BoxFuture<'static, Result<Option<UtcUs>, Store
     async move { Ok(store.events(&query).await?.first().map(|event| event.record.at)) }.boxed()
 }
 
-async fn open_store(config: &Config, station: &StationId, brought: Option<Store>) -> Result<Store, RunError> {
+pub(crate) async fn open_store(config: &Config, station: &StationId, brought: Option<Store>) -> Result<Store, RunError> {
     let simulated = config.is_simulated();
     let store = match brought {
         Some(store) => store,
@@ -388,12 +392,37 @@ async fn open_store(config: &Config, station: &StationId, brought: Option<Store>
 }
 
 /// Owns what it reads with: a future that borrows it is not `Send` enough for whoever spawns a run.
-fn snapshot(store: &Store, station: &StationConfig) -> BoxFuture<'static, Result<Snapshot, StoreError>> {
+pub(crate) fn snapshot(store: &Store, station: &StationConfig) -> BoxFuture<'static, Result<Snapshot, StoreError>> {
     let store = store.clone();
     let satellites: Vec<_> = station.satellites.iter().map(|satellite| satellite.id.clone()).collect();
     let keys: Vec<_> =
         station.satellites.iter().filter_map(|satellite| satellite.key.as_ref().map(Key::id)).collect();
     async move { store.snapshot(&satellites, &keys).await }.boxed()
+}
+
+/// Elements from the sources of the configuration: a task of its own, where there are any.
+fn elements(
+    config: &Config,
+    engine: &EngineHandle,
+    store: &Store,
+    timer: &Arc<dyn Timer>,
+    api: &Lifecycle,
+) -> Result<ElementsHandle, RunError> {
+    let (wanted, timer) = (Wanted::of(config), Arc::clone(timer));
+    if config.elements.fetch.is_empty() {
+        return Ok(ElementsHandle::without_sources(wanted, timer));
+    }
+    let door = Door { engine: engine.clone(), store: store.clone() };
+    let fetcher = Fetcher::new(config, store.folder(), door, Arc::clone(&timer)).map_err(|source| {
+        RunError::Io { what: "the folder 'elements' in the data folder cannot be made", source }
+    })?;
+    let (task, handle) = ElementsTask::new(fetcher, wanted, timer);
+    let stop = api.soft.clone();
+    api.spawn("elements", async move {
+        task.run(stop).await;
+        Ok(())
+    });
+    Ok(handle)
 }
 
 /// Applies what can be applied of changed configurations, and names what needs a restart.

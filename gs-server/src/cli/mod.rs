@@ -6,10 +6,12 @@
 mod config;
 mod decode;
 mod demo;
+mod elements;
 mod failure;
 mod key;
 mod look;
 mod passes;
+mod plan;
 mod radio;
 mod redecode;
 mod serve;
@@ -75,6 +77,12 @@ pub enum Command {
     /// The radio module by hand
     #[command(subcommand)]
     Radio(radio::Radio),
+    /// Elements: give them, list them, fetch them, check a file, make some before launch
+    #[command(subcommand)]
+    Elements(elements::Elements),
+    /// Plans: what to do in a pass. Begin one, check one
+    #[command(subcommand)]
+    Plan(plan::Plan),
     /// Make and list key files; their bytes are never printed
     #[command(subcommand)]
     Key(key::Key),
@@ -111,7 +119,9 @@ impl Cli {
             Command::Passes(passes) => passes.run(),
             Command::Look(look) => look.run(),
             Command::Radio(radio) => radio.run(),
+            Command::Elements(elements) => elements.run(),
             Command::Key(key) => key.run(),
+            Command::Plan(plan) => plan.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

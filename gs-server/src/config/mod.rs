@@ -23,7 +23,9 @@
 //! # Ok::<(), gs_server::config::ConfigError>(())
 //! ```
 
+mod antenna;
 mod check;
+mod elements;
 mod environment;
 mod error;
 mod links;
@@ -37,6 +39,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+pub use antenna::{RigSection, RotatorSection};
+pub(crate) use elements::is_loopback;
+pub use elements::{ElementsSection, FetchSource, MIN_AGE_LEAST_H};
 pub use environment::Environment;
 pub use error::ConfigError;
 pub use links::{AuxInput, LinkKind, LinkSection, ModePinWiring, Phy, UsbId};
@@ -59,6 +64,15 @@ pub struct Config {
     pub links: Vec<LinkSection>,
     /// Where everything is kept.
     pub storage: StorageSection,
+    /// Where elements are fetched from; nowhere by default.
+    #[serde(default)]
+    pub elements: ElementsSection,
+    /// The antenna's rotator, when there is one.
+    #[serde(default)]
+    pub rotator: Option<RotatorSection>,
+    /// A rig that is tuned with the Doppler shift, when there is one.
+    #[serde(default)]
+    pub rig: Option<RigSection>,
     /// Who may talk to the server, and where.
     #[serde(default)]
     pub http: HttpSection,
@@ -111,7 +125,8 @@ impl Config {
         let keys = self.satellites.iter_mut().filter_map(|satellite| satellite.key_file.as_mut());
         let files = self.links.iter_mut().filter_map(|link| link.file.as_mut());
         let others = [&mut self.storage.folder].into_iter().chain(self.http.token_file.as_mut());
-        for path in keys.chain(files).chain(others) {
+        let logins = self.elements.fetch.iter_mut().filter_map(|source| source.credentials_file.as_mut());
+        for path in keys.chain(files).chain(others).chain(logins) {
             if path.is_relative() {
                 *path = base.join(&*path);
             }

@@ -26,7 +26,10 @@ impl Changes {
         note(old.station != new.station, "station");
         note(old.satellites != new.satellites, "satellites");
         note(old.storage != new.storage, "storage");
+        note(old.rotator != new.rotator, "rotator");
+        note(old.rig != new.rig, "rig");
         note(old.http != new.http, "http");
+        note(old.elements != new.elements, "elements");
         note(old.simulation != new.simulation, "simulation");
         note(old.log.json != new.log.json, "log.json");
         note(old.links.len() != new.links.len(), "links");

@@ -30,6 +30,12 @@ pub struct SatelliteSection {
     /// Seconds between two heartbeats, 1 to 86,400. Default 60.
     #[serde(default = "default_heartbeat")]
     pub heartbeat_period_s: f64,
+    /// Its catalogue number, 1 to 999999999: finds its sets among others.
+    #[serde(default)]
+    pub norad_cat_id: Option<u32>,
+    /// Its name as element sets have it (OBJECT_NAME), for sets without a number or before there is one.
+    #[serde(default)]
+    pub object_name: Option<String>,
     /// Limits on its values.
     #[serde(default)]
     pub limits: Vec<LimitSection>,

@@ -54,6 +54,16 @@ impl fmt::Display for Config {
                 None => "no limit on its size".to_owned(),
             },
         )?;
+        for source in &self.elements.fetch {
+            writeln!(
+                f,
+                "elements from {}{}, every {} h, never within {} h",
+                source.url,
+                source.credentials_file.as_ref().map(|f| format!(", login in {}", f.display())).unwrap_or_default(),
+                self.elements.every_h,
+                self.elements.min_age_h,
+            )?;
+        }
         write!(
             f,
             "http {}: hosts {:?}, token in {}",
@@ -61,6 +71,24 @@ impl fmt::Display for Config {
             self.http.allowed_hosts,
             self.token_file().display()
         )?;
+        if let Some(rotator) = &self.rotator {
+            write!(
+                f,
+                "\nrotator at {}: azimuth {} to {}, elevation {} to {}, {}",
+                rotator.address,
+                rotator.azimuth_range.0,
+                rotator.azimuth_range.1,
+                rotator.elevation_range.0,
+                rotator.elevation_range.1,
+                match rotator.park {
+                    Some((azimuth, elevation)) => format!("parks at {azimuth}, {elevation}"),
+                    None => "parks by its own command".to_owned(),
+                },
+            )?;
+        }
+        if let Some(rig) = &self.rig {
+            write!(f, "\nrig at {}: downlink {} Hz", rig.address, rig.downlink_hz)?;
+        }
         if let Some(simulation) = &self.simulation {
             write!(f, "\nsimulation: {} times life", simulation.speed)?;
         }

@@ -11,6 +11,7 @@
 mod clock;
 mod commands;
 mod downloads;
+mod elements;
 mod events;
 mod extract;
 mod frames;
@@ -22,6 +23,7 @@ mod links;
 mod page;
 mod problem;
 mod routes;
+mod sky;
 mod station;
 mod status;
 mod stream;
@@ -38,13 +40,14 @@ use std::sync::Arc;
 use axum::Router;
 use axum::middleware::from_fn_with_state;
 use axum::serve::ListenerExt as _;
-use mission::{SatelliteId, StationConfig, StationId};
+use mission::{SatelliteId, Site, StationConfig, StationId};
 use protocol::KeyId;
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 use tower_http::compression::CompressionLayer;
 
 use crate::clock::Timer;
+use crate::elements::ElementsHandle;
 use crate::engine::EngineHandle;
 use crate::hub::Hub;
 use crate::storage::Store;
@@ -62,6 +65,8 @@ pub struct HttpState {
     pub store: Store,
     /// The engine: intents and status.
     pub engine: EngineHandle,
+    /// Elements: how satellites are found, and the sources.
+    pub elements: ElementsHandle,
     /// Committed events as they come.
     pub hub: Hub,
     /// The station's time, simulated or not.
@@ -81,6 +86,8 @@ pub struct HttpState {
 pub struct Identity {
     /// The station.
     pub station: StationId,
+    /// Where it stands; `None`: nobody said.
+    pub site: Option<Site>,
     /// Its satellites.
     pub satellites: Vec<SatelliteIdentity>,
     /// Time, satellite or radio are made up.
@@ -107,7 +114,12 @@ impl Identity {
             key: satellite.key.as_ref().map(protocol::Key::id),
             heartbeat_period_us: i64::try_from(satellite.profile.heartbeat_period_us).unwrap_or(i64::MAX),
         });
-        Self { station: config.station.clone(), satellites: satellites.collect(), simulated }
+        Self {
+            station: config.station.clone(),
+            site: config.site.clone(),
+            satellites: satellites.collect(),
+            simulated,
+        }
     }
 }
 
@@ -117,6 +129,8 @@ struct App {
     state: Arc<HttpState>,
     hosts: Arc<AllowedHosts>,
     streams: Arc<Semaphore>,
+    /// Turns of those who compute something long.
+    computing: Arc<Semaphore>,
 }
 
 /// The API and the page.
@@ -125,6 +139,7 @@ pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
         state: Arc::new(state),
         hosts: Arc::new(allowed_hosts),
         streams: Arc::new(Semaphore::new(STREAMS_MAX)),
+        computing: Arc::new(Semaphore::new(sky::COMPUTING_MAX)),
     };
     routes::table()
         .into_iter()

@@ -7,7 +7,7 @@ use axum::routing::{MethodRouter, get, post};
 
 use super::write::guard_write;
 use super::{
-    App, clock, commands, downloads, events, frames, images, keys, links, page, station, status, stream,
+    App, clock, commands, downloads, elements, events, frames, images, keys, links, page, sky, station, status, stream,
     telemetry,
 };
 
@@ -77,6 +77,16 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/images/{id}", images::get),
         read("/api/v1/images/{id}/chunks", images::chunks),
         read("/api/v1/images/{id}/file", images::file),
+        read("/api/v1/elements", elements::list),
+        write("/api/v1/elements", elements::add),
+        read("/api/v1/elements/sources", elements::sources),
+        write("/api/v1/elements/fetch", elements::fetch),
+        read("/api/v1/passes", sky::passes),
+        read("/api/v1/passes/history", sky::history),
+        read("/api/v1/passes/sky.svg", sky::sky),
+        read("/api/v1/passes/timeline.svg", sky::timeline),
+        read("/api/v1/passes.ics", sky::calendar),
+        read("/api/v1/look", sky::look),
         read("/api/v1/events", events::list),
         read("/api/v1/limits", events::limits),
         read("/api/v1/audit", events::audit),

@@ -26,7 +26,7 @@ pub(super) const BODY_MAX: usize = 64 * 1024;
 const KEY_MAX: usize = 128;
 
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
-const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
+pub(super) const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 
 /// Who writes what, checked.
 #[derive(Debug, Clone)]
@@ -160,6 +160,12 @@ impl<T: DeserializeOwned> FromRequestParts<App> for Write<T> {
 }
 
 impl<T> Write<T> {
+    /// Who writes, under which idempotency key, and the SHA-256 of the request: for writes that are not one intent.
+    pub(super) fn who(&self) -> (Principal, String, [u8; 32]) {
+        let Checked { principal, idempotency_key, digest, .. } = &self.checked;
+        (principal.clone(), idempotency_key.clone(), *digest)
+    }
+
     /// Asks the engine, and answers when what it did is durable.
     pub(super) async fn submit(self, app: &App, intent: Intent) -> Result<Response, Failure> {
         let Checked { principal, idempotency_key, digest, .. } = self.checked;
