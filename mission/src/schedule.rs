@@ -39,7 +39,7 @@ mod search;
 mod settle;
 mod task;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub use answer::{Contact, Cut, Reason, Refused, Remembered, Rival, Role, Schedule, Worth};
 pub use key::{Foretold, PassKey, identify};
@@ -56,11 +56,25 @@ use task::{Choice, Piece, Task};
 pub fn plan(problem: &Problem, memory: &[Remembered]) -> Schedule {
     let memory: BTreeMap<&PassKey, &Remembered> = memory.iter().map(|r| (&r.key, r)).collect();
     let layout = lay(problem, &memory);
-    let leads = choose(problem, &layout, &layout.choices, &memory, false);
-    let mut taken = leads.taken.clone();
-    let ears = choose(problem, &layout, &left_over(problem, &layout, &leads.taken), &memory, true);
-    taken.extend(ears.taken);
+    let leads = choose(problem, &layout, &layout.choices, &memory, Round::Leads);
+    let mut taken = leads.taken;
+    // What a search that was cut off left lying, then those who only listen.
+    for round in [Round::Rest, Round::Ears] {
+        let left = left_over(problem, &layout, &taken, round);
+        taken.extend(choose(problem, &layout, &left, &memory, round).taken);
+    }
     settle::settle(problem, &layout, &memory, taken, &leads.questions, leads.bound)
+}
+
+/// What is being chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Round {
+    /// The contacts that count.
+    Leads,
+    /// More of them, in the time that was left.
+    Rest,
+    /// Contacts that listen along.
+    Ears,
 }
 
 /// A choice that was taken, for good.
@@ -88,12 +102,12 @@ fn choose(
     layout: &Layout,
     choices: &[Choice],
     memory: &BTreeMap<&PassKey, &Remembered>,
-    ears: bool,
+    round: Round,
 ) -> Chosen {
     let mut out = Chosen::default();
     let then = |c: &Choice| memory.get(&problem.candidates[c.candidate].key).copied();
     let promised = |c: &Choice| {
-        let then = then(c).filter(|then| then.ear == ears)?;
+        let then = then(c).filter(|then| then.ear == (round == Round::Ears))?;
         let (antenna, start_s, stop_s) = then.chosen.as_ref()?;
         (*antenna == problem.antennas[c.antenna].id).then_some((*start_s, *stop_s))
     };
@@ -104,8 +118,8 @@ fn choose(
         let question = question(problem, &task, &members, choices);
         let share = problem.policy.max_states.saturating_mul(members.len()) / choices.len().max(1);
         let mut states = share.max(1_000).min(problem.policy.max_states);
-        let is_old =
-            !ears && all.clone().all(|i| then(place(i)).is_some_and(|then| then.question == question));
+        let is_old = round == Round::Leads
+            && all.clone().all(|i| then(place(i)).is_some_and(|then| then.question == question));
         let before = if is_old {
             let piece = |choice: usize| {
                 let (start_s, stop_s) = promised(place(choice))?;
@@ -154,8 +168,9 @@ fn as_promised(task: &Task, promised: &[usize], states: &mut usize) -> Vec<Piece
 }
 
 /// What idle antennas could still do: the choices that were not taken, in the time that was not.
-fn left_over(problem: &Problem, layout: &Layout, taken: &[Taken]) -> Vec<Choice> {
-    let served: BTreeMap<usize, usize> = taken.iter().map(|t| (t.candidate, t.antenna)).collect();
+fn left_over(problem: &Problem, layout: &Layout, taken: &[Taken], round: Round) -> Vec<Choice> {
+    let led: BTreeSet<usize> = taken.iter().filter_map(|t| layout.laid[t.candidate].job).collect();
+    let served: BTreeSet<usize> = taken.iter().map(|t| t.candidate).collect();
     let mut busy: Vec<Vec<Closed>> = vec![Vec::new(); layout.gap_s.len()];
     for t in taken {
         let gap_s = layout.gap_s[t.antenna];
@@ -169,7 +184,9 @@ fn left_over(problem: &Problem, layout: &Layout, taken: &[Taken]) -> Vec<Choice>
         closed.sort_by_key(|c| c.from_s);
     }
     let mut out = Vec::new();
-    for c in layout.choices.iter().filter(|c| !served.contains_key(&c.candidate)) {
+    let wanted =
+        |c: &&Choice| !served.contains(&c.candidate) && led.contains(&c.job) == (round == Round::Ears);
+    for c in layout.choices.iter().filter(wanted) {
         let closed = &busy[c.antenna];
         let first = closed.partition_point(|b| b.until_s <= c.from_s);
         for (from_s, until_s) in gaps(c.from_s, c.until_s, &closed[first..]) {
@@ -178,8 +195,9 @@ fn left_over(problem: &Problem, layout: &Layout, taken: &[Taken]) -> Vec<Choice>
             let whole = (from_s, until_s) == (c.from_s, c.until_s);
             if whole || (!c.is_rigid() && until_s - from_s >= needed_s) {
                 let min_s = if whole { c.min_s } else { needed_s };
-                // A job of its own: a passage may have many ears.
-                out.push(Choice { job: c.candidate, from_s, until_s, min_s, ..c.clone() });
+                // A passage may have many ears.
+                let job = if round == Round::Ears { c.candidate } else { c.job };
+                out.push(Choice { job, from_s, until_s, min_s, ..c.clone() });
             }
         }
     }

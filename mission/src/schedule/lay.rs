@@ -67,6 +67,7 @@ pub(super) fn lay(problem: &Problem, memory: &BTreeMap<&PassKey, &Remembered>) -
         if let Some(then) = memory.get(&candidate.key)
             && (aos_s - then.aos_s).abs() <= drift_s
             && (los_s - then.los_s).abs() <= drift_s
+            && (los_s - aos_s).min(then.los_s - then.aos_s) >= i64::from(candidate.min_duration_s)
         {
             (aos_s, los_s) = (then.aos_s, then.los_s);
         }

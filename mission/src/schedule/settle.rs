@@ -87,10 +87,11 @@ impl Settling<'_> {
             let (_, closed) = laid.closed.iter().find(|(antenna, _)| *antenna == taken.antenna)?;
             closed.iter().find(|c| hits(c.from_s, c.until_s)).map(|c| Cut::Closed(c.why.clone()))
         };
-        let cut_start = (taken.start_s > laid.aos_s).then(|| {
+        let (late, early) = (start_s > ceil_s(candidate.aos.0), stop_s < floor_s(candidate.los.0));
+        let cut_start = late.then(|| {
             closed(&|_, until_s| until_s == taken.start_s).or_else(|| before.map(|t| Cut::Contact(key_of(t))))
         });
-        let cut_stop = (taken.stop_s < laid.los_s).then(|| {
+        let cut_stop = early.then(|| {
             closed(&|from_s, _| from_s == taken.stop_s).or_else(|| after.map(|t| Cut::Contact(key_of(t))))
         });
         Contact {
@@ -100,7 +101,7 @@ impl Settling<'_> {
             antenna: self.problem.antennas[taken.antenna].id.clone(),
             start: utc(start_s),
             stop: utc(stop_s),
-            whole: (taken.start_s, taken.stop_s) == (laid.aos_s, laid.los_s),
+            whole: !late && !early,
             worth: if taken.lead.is_none() { self.worth(taken) } else { Worth::default() },
             role: taken.lead.map_or(Role::Lead, |lead| Role::Ear(key_of(lead))),
             transmit: None,
