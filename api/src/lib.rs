@@ -27,6 +27,7 @@ mod event;
 mod frame;
 mod image;
 mod page;
+mod plan;
 mod problem;
 mod sky;
 mod station;
@@ -46,6 +47,10 @@ pub use event::{AuditView, EventView, LimitView};
 pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
 pub use image::{ChunkMap, ImageView};
 pub use page::{Nothing, Page};
+pub use plan::{
+    ApprovalText, AtLosWord, AttachText, ConditionText, GuardText, MinPassText, OnFailureWord, PlanFinding,
+    PlanText, StepText,
+};
 pub use problem::{FieldError, Problem, ProblemKind};
 pub use sky::{ElementsView, FineTime, LookView, PassEndWord, PassView, RefusedElements, SkyGapView};
 pub use station::{
