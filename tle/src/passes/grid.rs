@@ -69,6 +69,7 @@ pub(super) struct Block {
     cos_reach: Vec<f64>,
     clock: Option<Clock>,
     pieces: Vec<Option<Piece>>,
+    is_round: bool,
 }
 
 impl Block {
@@ -82,8 +83,8 @@ impl Block {
     /// The motion from node k to node k + 1.
     pub(super) fn piece(&mut self, k: usize) -> &Piece {
         let clock = self.clock.unwrap_or(Clock { e: 0.0, rate: 1.0, perigee_s: 0.0 });
-        let (from, to) = (&self.nodes[k], &self.nodes[k + 1]);
-        self.pieces[k].get_or_insert_with(|| Piece::new(clock, from, to))
+        let (from, to, is_round) = (&self.nodes[k], &self.nodes[k + 1], self.is_round);
+        self.pieces[k].get_or_insert_with(|| Piece::new(clock, from, to, is_round))
     }
 
     fn clear(&mut self) {
@@ -206,6 +207,7 @@ impl Grid {
         self.velocities_are_flawed = self.flawed(motion, &states);
         self.fill(motion, &states, block);
         self.states = states;
+        block.is_round = motion.is_round();
         block.close(&self.reach, self.clock);
         self.next_s = self.times.last().copied().unwrap_or(self.stop_s);
         true
@@ -356,7 +358,7 @@ impl Grid {
         if last.radius_km.min(next.radius_km) > SGP4_EARTH_RADIUS_KM + self.dip_km {
             return;
         }
-        let piece = Piece::new(self.clock, &last, next);
+        let piece = Piece::new(self.clock, &last, next, false);
         let watched: Vec<f64> = (1..32)
             .map(|k| f64::from(k) / 32.0)
             .filter(|&p| norm(piece.position(p)) < SGP4_EARTH_RADIUS_KM + DECAY_WATCH_KM)

@@ -102,7 +102,13 @@ impl<'a> Motion<'a> {
 
     /// The state in TEME.
     pub(super) fn teme(&mut self, t_s: f64) -> Result<State, PropagationError> {
-        self.calls += 1;
+        let mut found = None;
+        self.many_teme(&[t_s], |_, _, state| found = Some(state));
+        found.unwrap_or_else(|| self.scalar(t_s))
+    }
+
+    /// The state by the scalar path, which costs more but knows why there is none.
+    fn scalar(&self, t_s: f64) -> Result<State, PropagationError> {
         self.propagator.at_minutes(self.origin_min + t_s / 60.0)
     }
 
@@ -144,31 +150,27 @@ impl<'a> Motion<'a> {
         times_s: &[f64],
         mut take: impl FnMut(&Self, usize, Result<State, PropagationError>),
     ) {
-        if let Some(lanes) = self.lanes {
-            let mut minutes = std::mem::take(&mut self.minutes);
-            let mut columns = std::mem::take(&mut self.columns);
-            minutes.clear();
-            minutes.extend(times_s.iter().map(|t_s| self.origin_min + t_s / 60.0));
-            match lanes {
-                Lanes::NearEarth(orbit) => orbit.propagate(&minutes, &mut columns),
-                Lanes::DeepSpace(orbit) => orbit.propagate(&minutes, &mut self.anchors, &mut columns),
-            }
-            self.calls += times_s.len() as u64;
-            for (index, &t_s) in times_s.iter().enumerate() {
-                let state = match columns.get(index) {
-                    Some((r_teme_km, v_teme_km_s)) => Ok(State { r_teme_km, v_teme_km_s }),
-                    None => self.teme(t_s),
-                };
-                take(self, index, state);
-            }
-            self.minutes = minutes;
-            self.columns = columns;
-        } else {
-            for (index, &t_s) in times_s.iter().enumerate() {
-                let state = self.teme(t_s);
-                take(self, index, state);
-            }
+        self.calls += times_s.len() as u64;
+        let mut minutes = std::mem::take(&mut self.minutes);
+        let mut columns = std::mem::take(&mut self.columns);
+        minutes.clear();
+        minutes.extend(times_s.iter().map(|t_s| self.origin_min + t_s / 60.0));
+        match self.lanes {
+            Some(Lanes::NearEarth(orbit)) => orbit.propagate(&minutes, &mut columns),
+            Some(Lanes::DeepSpace(orbit)) => orbit.propagate(&minutes, &mut self.anchors, &mut columns),
+            None => {}
         }
+        for (index, &t_s) in times_s.iter().enumerate() {
+            let state = match columns.get(index) {
+                Some((r_teme_km, v_teme_km_s)) if self.lanes.is_some() => {
+                    Ok(State { r_teme_km, v_teme_km_s })
+                }
+                _ => self.scalar(t_s),
+            };
+            take(self, index, state);
+        }
+        self.minutes = minutes;
+        self.columns = columns;
     }
 
     /// Many states over the turning Earth; `None` where the theory has no answer.

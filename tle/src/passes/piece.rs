@@ -86,9 +86,16 @@ impl Clock {
     }
 }
 
+/// Parts of a piece that all stations look at: of a round orbit's, and of another's.
+const PARTS_ROUND: usize = 1;
+const PARTS: usize = 2;
+
 /// The motion between two nodes; the parameter p runs from 0 to 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
+    /// The motion at the ends of its parts, of which the last few may be missing.
+    marks: [Motion2; PARTS + 1],
+    parts: usize,
     coefficients: [Vec3; 6],
     clock: Clock,
     start_s: f64,
@@ -106,7 +113,7 @@ pub(super) struct Motion2 {
 }
 
 impl Piece {
-    pub(super) fn new(clock: Clock, from: &Node, to: &Node) -> Self {
+    pub(super) fn new(clock: Clock, from: &Node, to: &Node, is_round: bool) -> Self {
         let span = to.anomaly - from.anomaly;
         let (rate0, bend0) = clock.rates(from.anomaly, span);
         let (rate1, bend1) = clock.rates(to.anomaly, span);
@@ -131,7 +138,32 @@ impl Piece {
             }
         }
         let start_sin = if clock.e == 0.0 { 0.0 } else { from.anomaly.sin() };
-        Self { coefficients, clock, start_s: from.t_s, start_anomaly: from.anomaly, start_sin, span }
+        let parts = if is_round { PARTS_ROUND } else { PARTS };
+        let nowhere = Motion2 { r: [0.0; 3], r1: [0.0; 3], r2: [0.0; 3] };
+        let mut piece = Self {
+            marks: [nowhere; PARTS + 1],
+            parts,
+            coefficients,
+            clock,
+            start_s: from.t_s,
+            start_anomaly: from.anomaly,
+            start_sin,
+            span,
+        };
+        for index in 0..=parts {
+            piece.marks[index] = piece.motion(index as f64 / parts as f64);
+        }
+        piece
+    }
+
+    /// In how many parts to look at it.
+    pub(super) const fn parts(&self) -> usize {
+        self.parts
+    }
+
+    /// The motion at both ends of every part.
+    pub(super) fn marks(&self) -> &[Motion2] {
+        &self.marks[..=self.parts]
     }
 
     /// The time at p, seconds since the window began.

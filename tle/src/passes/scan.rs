@@ -9,9 +9,12 @@ use super::refine::{crossing_between, summit};
 use super::sky::{Sight, Sky};
 
 /// Parts in which a piece is looked at for summits. A summit and a valley within one part would both be missed: they are
-/// half a revolution apart on round low orbits, but shallow ones come close together on slow orbits.
+/// half a revolution apart on round low orbits, but shallow ones come close together on slow orbits. There, a part whose
+/// ends both lean towards a turn is halved, so many times at most.
 const PARTS_ROUND: usize = 1;
-const PARTS: usize = 8;
+const HALVINGS_MAX: u32 = 3;
+/// How far the tangents of both ends may miss each other, in lengths of the part, and the part still be halved.
+const LEAN_MARGIN: f64 = 0.5;
 /// How far a piece may be from SGP4, km, with a margin of five: measured 0.02 near Earth, 0.5 far out. A summit whose
 /// clearance is within twice that is computed by true SGP4 before anything is said about it.
 const PIECE_ERROR_KM: f64 = 0.1;
@@ -55,8 +58,22 @@ struct Carry {
 #[derive(Debug, Clone, Copy)]
 struct Point {
     p: f64,
-    t_s: f64,
+    /// By true SGP4, where it was asked.
+    t_s: Option<f64>,
     above: bool,
+}
+
+impl Point {
+    fn time_s(&self, piece: &Piece) -> f64 {
+        self.t_s.unwrap_or_else(|| piece.time_s(self.p))
+    }
+}
+
+/// One end of a part: where, and what is seen there.
+#[derive(Debug, Clone, Copy)]
+struct Mark {
+    p: f64,
+    sight: Sight,
 }
 
 /// One station's way through the blocks.
@@ -129,15 +146,20 @@ impl<'a> Scan<'a> {
         self.sky.sight(motion.r, motion.r1, motion.r2)
     }
 
+    fn mark(&self, piece: &Piece, index: usize) -> Mark {
+        let motion = &piece.marks()[index];
+        Mark { p: index as f64 / piece.parts() as f64, sight: self.sky.sight(motion.r, motion.r1, motion.r2) }
+    }
+
     /// Looks through one cell. `edge`: there is nothing before it.
     fn cell(&mut self, piece: &Piece, cell: u64, edge: Option<Edge>, motion: &mut Motion<'_>) {
-        let carried = self.carry.filter(|carry| carry.cell == cell);
-        let (mut above, mut climb) = if let Some(carry) = carried {
-            (carry.above, carry.climb)
-        } else {
-            let sight = self.sight(piece, 0.0);
-            (sight.clearance > 0.0, sight.climb)
-        };
+        let mut from = self.mark(piece, 0);
+        let mut above = from.sight.clearance > 0.0;
+        if let Some(carry) = self.carry.filter(|carry| carry.cell == cell) {
+            // The same place as the end of the cell before, but for rounding: it must look the same.
+            above = carry.above;
+            from.sight.climb = from.sight.climb.abs().copysign(carry.climb);
+        }
         if above && self.open.is_none() {
             // Nothing can be above the threshold where the cells before were ruled out, unless there are none.
             self.open = Some((
@@ -146,26 +168,42 @@ impl<'a> Scan<'a> {
                 Vec::new(),
             ));
         }
-        let mut from = Point { p: 0.0, t_s: piece.time_s(0.0), above };
-        let parts = if motion.is_round() { PARTS_ROUND } else { PARTS };
-        for part in 1..=parts {
-            let p = part as f64 / parts as f64;
-            let sight = self.sight(piece, p);
-            if (climb > 0.0) != (sight.climb > 0.0) {
-                let turn = self.turn(piece, [from.p, p], [climb, sight.climb], motion);
-                self.between(piece, from, turn, motion);
-                if climb > 0.0 && turn.above {
-                    self.note_summit(turn.t_s);
-                }
-                from = turn;
-            }
-            let to = Point { p, t_s: piece.time_s(p), above: sight.clearance > 0.0 };
-            self.between(piece, from, to, motion);
+        let mut point = Point { p: 0.0, t_s: None, above };
+        let halvings = if piece.parts() == PARTS_ROUND { 0 } else { HALVINGS_MAX };
+        for index in 1..=piece.parts() {
+            let to = self.mark(piece, index);
+            point = self.part(piece, point, [from, to], halvings, motion);
             from = to;
-            above = to.above;
-            climb = sight.climb;
         }
-        self.carry = Some(Carry { cell: cell + 1, above, climb });
+        self.carry = Some(Carry { cell: cell + 1, above: point.above, climb: from.sight.climb });
+    }
+
+    /// Looks through a part from the point at its beginning; the point at its end.
+    fn part(
+        &mut self,
+        piece: &Piece,
+        mut point: Point,
+        [from, to]: [Mark; 2],
+        halvings: u32,
+        motion: &mut Motion<'_>,
+    ) -> Point {
+        let rising = from.sight.climb > 0.0;
+        if rising != (to.sight.climb > 0.0) {
+            let turn = self.turn(piece, [from.p, to.p], [from.sight.climb, to.sight.climb], motion);
+            self.between(piece, point, turn, motion);
+            if rising && turn.above {
+                self.note_summit(turn.time_s(piece));
+            }
+            point = turn;
+        } else if halvings > 0 && leans_to_a_turn(&from, &to) {
+            let p = 0.5 * (from.p + to.p);
+            let middle = Mark { p, sight: self.sight(piece, p) };
+            let point = self.part(piece, point, [from, middle], halvings - 1, motion);
+            return self.part(piece, point, [middle, to], halvings - 1, motion);
+        }
+        let end = Point { p: to.p, t_s: None, above: to.sight.clearance > 0.0 };
+        self.between(piece, point, end, motion);
+        end
     }
 
     /// The place between two parts' ends, with these climbs, where the elevation turns.
@@ -176,14 +214,15 @@ impl<'a> Scan<'a> {
             (falling * sight.climb, falling * sight.climb1)
         });
         let clearance = self.clearance(piece, p);
-        let t_s = piece.time_s(p);
         let unsure = 2.0 * (PIECE_ERROR_KM + PIECE_ERROR_PART * piece.length_km());
         if clearance.abs() > unsure {
-            return Point { p, t_s, above: clearance > 0.0 };
+            return Point { p, t_s: None, above: clearance > 0.0 };
         }
-        match summit(&self.sky, motion, t_s) {
-            Ok(truth) => Point { p, t_s: truth.t_s, above: self.sky.clearance(truth.state.r_ecef_km) > 0.0 },
-            Err(_) => Point { p, t_s, above: clearance > 0.0 },
+        match summit(&self.sky, motion, piece.time_s(p)) {
+            Ok(truth) => {
+                Point { p, t_s: Some(truth.t_s), above: self.sky.clearance(truth.state.r_ecef_km) > 0.0 }
+            }
+            Err(_) => Point { p, t_s: None, above: clearance > 0.0 },
         }
     }
 
@@ -200,10 +239,11 @@ impl<'a> Scan<'a> {
                 let (clearance, slope) = self.sky.clearance_and_slope(r, r1);
                 (rising * clearance, rising * slope)
             });
-            Edge::Near(piece.time_s(p), [from.t_s, to.t_s])
+            Edge::Near(piece.time_s(p), [from.time_s(piece), to.time_s(piece)])
         } else {
             // The piece does not show what SGP4 said of the summit.
-            Edge::At(crossing_between(&self.sky, motion, from.t_s, to.t_s, to.above))
+            let (from_s, to_s) = (from.time_s(piece), to.time_s(piece));
+            Edge::At(crossing_between(&self.sky, motion, from_s, to_s, to.above))
         };
         if to.above {
             self.open = Some((crossing, None, Vec::new()));
@@ -225,6 +265,17 @@ impl<'a> Scan<'a> {
             }
         }
     }
+}
+
+/// Whether the elevation, which goes the same way at both ends, may turn and turn back between them: its climb falls towards
+/// zero from both, and the tangents reach zero before they meet.
+fn leans_to_a_turn(from: &Mark, to: &Mark) -> bool {
+    let (a, b) = (&from.sight, &to.sight);
+    if a.climb * a.climb1 >= 0.0 || b.climb * b.climb1 <= 0.0 {
+        return false;
+    }
+    let span = to.p - from.p;
+    a.climb / -a.climb1 + b.climb / b.climb1 < span * (1.0 + LEAN_MARGIN)
 }
 
 /// A step by which a root no longer matters: Newton squares what is left, and true SGP4 has the last word.
@@ -256,6 +307,19 @@ fn root(ends: [f64; 2], values: [f64; 2], value_and_slope: impl Fn(f64) -> (f64,
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn part_whose_ends_lean_to_a_turn_is_halved() {
+        let mark =
+            |p, climb, climb1| Mark { p, sight: Sight { clearance: 1.0, clearance1: 0.0, climb, climb1 } };
+        // A parabola that dips below zero between the ends, and one that stays far above.
+        let dip = |p: f64, depth: f64| mark(p, 4.0 * (p - 0.5).powi(2) - depth, 8.0 * (p - 0.5));
+        assert!(leans_to_a_turn(&dip(0.0, 0.1), &dip(1.0, 0.1)));
+        assert!(!leans_to_a_turn(&dip(0.0, -2.0), &dip(1.0, -2.0)));
+        // The same upside down; and a climb that only grows.
+        assert!(leans_to_a_turn(&mark(0.0, -0.9, 4.0), &mark(1.0, -0.9, -4.0)));
+        assert!(!leans_to_a_turn(&mark(0.0, 0.5, 1.0), &mark(1.0, 1.5, 1.0)));
+    }
 
     #[test]
     fn root_is_found_on_flat_and_steep_curves() {
