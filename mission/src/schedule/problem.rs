@@ -149,7 +149,7 @@ pub struct Policy {
 
 impl Default for Policy {
     fn default() -> Self {
-        Self { drift_s: 5, keep_permille: 100, max_states: 200_000 }
+        Self { drift_s: 5, keep_permille: 100, max_states: 50_000 }
     }
 }
 

@@ -16,6 +16,21 @@ pub(super) struct Ahead {
     take: Vec<Option<(u32, i64)>>,
 }
 
+/// A choice that can begin in the second that is looked at (going back in time).
+struct Open {
+    choice: usize,
+    rate: i64,
+    min_s: i64,
+    /// Its promise less the price of its job.
+    extra: i64,
+    /// The earliest begin: the last one to be looked at.
+    last_s: i64,
+    /// The most that `rate * end` and what can be earned after it come to, over the ends within reach.
+    reach: i64,
+    /// The end that does.
+    end_s: i64,
+}
+
 impl Ahead {
     /// What can still be earned by pieces that begin at or after `at_s`.
     pub(super) fn earn(&self, at_s: i64) -> i64 {
@@ -31,32 +46,44 @@ impl Ahead {
         let mut by_latest: Vec<usize> =
             (0..task.choices.len()).filter(|&i| task.choices[i].antenna == antenna).collect();
         by_latest.sort_by_key(|&i| task.choices[i].latest_s());
-        // The choices that can begin in this second, with the best end found so far: (choice, rate * end + rest, end).
-        let mut open: Vec<(usize, i64, i64)> = Vec::new();
+        let mut open: Vec<Open> = Vec::new();
         for index in (0..length).rev() {
             let at_s = from_s + index as i64;
-            while let Some(&next) = by_latest.last().filter(|&&i| task.choices[i].latest_s() >= at_s) {
+            while let Some(&choice) = by_latest.last().filter(|&&i| task.choices[i].latest_s() >= at_s) {
                 by_latest.pop();
-                open.push((next, i64::MIN, 0));
+                let c = &task.choices[choice];
+                let (extra, last_s) = (c.promise - prices[c.job], c.from_s);
+                open.push(Open {
+                    choice,
+                    rate: c.rate,
+                    min_s: c.min_s,
+                    extra,
+                    last_s,
+                    reach: i64::MIN,
+                    end_s: 0,
+                });
             }
             let mut best = ahead.earn[index + 1];
             let mut take = None;
-            for (choice, reach, end_s) in &mut open {
-                let c = &task.choices[*choice];
-                let stop_s = at_s + c.min_s;
-                let with = c.rate * stop_s + ahead.earn(stop_s + gap_s);
-                if with > *reach {
-                    (*reach, *end_s) = (with, stop_s);
+            let mut ends = false;
+            for o in &mut open {
+                let stop_s = at_s + o.min_s;
+                let with = o.rate * stop_s + ahead.earn(stop_s + gap_s);
+                if with > o.reach {
+                    (o.reach, o.end_s) = (with, stop_s);
                 }
-                let worth = *reach - c.rate * at_s + c.promise - prices[c.job];
-                if worth > best && (at_s == c.from_s || !c.is_rigid()) {
-                    best = worth;
-                    take = Some((u32::try_from(*choice).unwrap_or(u32::MAX), *end_s));
+                let weight = o.reach - o.rate * at_s + o.extra;
+                if weight > best {
+                    best = weight;
+                    take = Some((u32::try_from(o.choice).unwrap_or(u32::MAX), o.end_s));
                 }
+                ends |= o.last_s == at_s;
             }
             ahead.earn[index] = best;
             ahead.take[index] = take;
-            open.retain(|(choice, ..)| task.choices[*choice].from_s < at_s);
+            if ends {
+                open.retain(|o| o.last_s < at_s);
+            }
         }
         ahead
     }
@@ -123,6 +150,9 @@ pub(super) fn relax(task: &Task) -> Relaxed {
         if since_better == 4 {
             pace /= 2.0;
             since_better = 0;
+        }
+        if pace < 0.1 {
+            break;
         }
         let lowest = best.as_ref().map_or(bound, |b| b.bound);
         let slope: Vec<i64> =

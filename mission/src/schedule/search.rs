@@ -12,7 +12,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::relax::Relaxed;
-use super::task::{Piece, Task};
+use super::task::{Choice, Piece, Task};
 
 /// Free since before the label's own time: it does not matter since when, whatever could have begun then was declined.
 const IDLE: i64 = i64::MIN;
@@ -38,14 +38,18 @@ struct Reached {
 fn turning_points(task: &Task) -> Vec<Vec<i64>> {
     let mut points: Vec<BTreeSet<i64>> = vec![BTreeSet::new(); task.gap_s.len()];
     for (antenna, points) in points.iter_mut().enumerate() {
-        let here = || task.choices.iter().filter(|c| c.antenna == antenna);
-        let mut news: Vec<i64> = here().flat_map(|c| [c.from_s, c.latest_s()]).collect();
+        let gap_s = task.gap_s[antenna];
+        // By begin, as the task's are.
+        let here: Vec<&Choice> = task.choices.iter().filter(|c| c.antenna == antenna).collect();
+        let longest_s = here.iter().map(|c| c.until_s - c.from_s).max().unwrap_or(0);
+        let mut news: Vec<i64> = here.iter().flat_map(|c| [c.from_s, c.latest_s()]).collect();
         while let Some(point) = news.pop() {
             if !points.insert(point) {
                 continue;
             }
-            for c in here() {
-                let before = point - task.gap_s[antenna] - c.min_s;
+            let first = here.partition_point(|c| c.from_s < point - gap_s - longest_s);
+            for c in here[first..].iter().take_while(|c| c.from_s < point) {
+                let before = point - gap_s - c.min_s;
                 if c.from_s < before && before < c.latest_s() {
                     news.push(before);
                 }

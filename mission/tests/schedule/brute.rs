@@ -1,4 +1,4 @@
-//! Every set, every order, every second: the best worth by exhaustion, for small questions at one station.
+//! Every set, every order, every second: the best worth by exhaustion, for small questions.
 
 use mission::UtcUs;
 use mission::schedule::{Antenna, Candidate, Partial, Problem, Scope};
@@ -24,11 +24,21 @@ fn is_open(problem: &Problem, antenna: &Antenna, candidate: &Candidate, tick: i6
         };
         covers && (second(b.window.start) - drift_s..second(b.window.stop) + drift_s).contains(&tick)
     });
-    let licence = problem.sites.first().and_then(|s| s.licence.as_ref()).filter(|_| candidate.transmit);
+    let licence = problem
+        .sites
+        .iter()
+        .find(|s| s.station == candidate.station)
+        .and_then(|s| s.licence.as_ref())
+        .filter(|_| candidate.transmit);
     let legal = licence.is_none_or(|windows| {
         windows.iter().any(|w| (second(w.start) + drift_s..second(w.stop) - drift_s).contains(&tick))
     });
     legal && !shut
+}
+
+fn serves(antenna: &Antenna, candidate: &Candidate) -> bool {
+    antenna.station == candidate.station
+        && (candidate.antennas.is_empty() || candidate.antennas.contains(&antenna.id))
 }
 
 /// Which ends a contact may have that begins at `tick`.
@@ -53,10 +63,10 @@ fn ends(problem: &Problem, antenna: &Antenna, candidate: &Candidate, tick: i64) 
 /// short or shut out is in none.
 fn passages(problem: &Problem) -> Vec<Option<usize>> {
     let usable = |c: &&Candidate| {
-        problem.antennas.iter().any(|a| {
-            (c.antennas.is_empty() || c.antennas.contains(&a.id))
-                && (0..END as i64).any(|tick| !ends(problem, a, c, tick).is_empty())
-        })
+        problem
+            .antennas
+            .iter()
+            .any(|a| serves(a, c) && (0..END as i64).any(|tick| !ends(problem, a, c, tick).is_empty()))
     };
     let mut of = vec![None; problem.candidates.len()];
     let mut passages = 0;
@@ -95,7 +105,7 @@ pub(crate) fn best(problem: &Problem) -> i64 {
             }
             for (i, c) in problem.candidates.iter().enumerate() {
                 let Some(passage) = of[i] else { continue };
-                if !c.antennas.is_empty() && !c.antennas.contains(&antenna.id) {
+                if !serves(antenna, c) {
                     continue;
                 }
                 let length_s = second(c.los) - second(c.aos);

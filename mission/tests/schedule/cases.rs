@@ -109,6 +109,22 @@ pub(crate) fn tight(seed: u64) -> Problem {
     problem
 }
 
+/// The same at two stations with an antenna or two: passages that both could take.
+pub(crate) fn tight_pair(seed: u64) -> Problem {
+    let mut problem = tight(seed);
+    let mut rng = chance(seed ^ 0xfeed);
+    problem.antennas.truncate(2);
+    problem.antennas.push(mast("dish", "hill", rng.random_range(0..5)));
+    for candidate in &mut problem.candidates {
+        candidate.antennas.clear();
+        if rng.random_bool(0.5) {
+            candidate.station = station("hill");
+            candidate.key.station = station("hill");
+        }
+    }
+    problem
+}
+
 /// Days as they are: satellites with a period of some 95 min, seen by neighbouring stations at nearly the same time.
 pub(crate) fn days(seed: u64, satellites: usize, stations: usize, masts: usize, days: i64) -> Problem {
     let mut rng = chance(seed);

@@ -42,15 +42,3 @@ fn a_fortnight_of_three_stations_is_close_to_the_bound() {
 fn a_crowd_is_answered_in_bounded_work() {
     measured("60 satellites, 3 stations with 2 antennas, 7 days", 60, 3, 2, 7, 0.05);
 }
-
-#[test]
-fn tmp_timing() {
-    for (st, w) in [(0, 0), (20_000, 0), (200_000, 0)] {
-        let _ = w;
-        let mut problem = days(7, 60, 3, 2, 7);
-        problem.policy.max_states = st;
-        let begin = std::time::Instant::now();
-        let s = plan(&problem, &[]);
-        println!("states {st}: {:?} gap {}", begin.elapsed(), s.gap());
-    }
-}
