@@ -9,7 +9,7 @@
 //! | [`CommandRequest`], [`CommandView`] | telecommands: asked for, and on their way |
 //! | [`telecommand`] | every telecommand of the ICD to JSON and back, with errors that name the field |
 //! | [`ImageView`], [`ChunkMap`], [`DownloadView`] | pictures and the orders to bring them home |
-//! | [`PassView`], [`LookView`], [`ElementsView`] | what is in the sky, with [`FineTime`] to the microsecond |
+//! | [`PassList`], [`LookList`], [`PassKept`], [`ElementsView`] | what is in the sky, with [`FineTime`] to the microsecond |
 //! | [`ElementsRequest`], [`HeldElements`], [`FetchReport`] | elements: given, held, fetched |
 //! | [`StreamMessage`] | what the WebSocket says |
 //! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
@@ -52,7 +52,10 @@ pub use plan::{
     PlanText, StepText,
 };
 pub use problem::{FieldError, Problem, ProblemKind};
-pub use sky::{ElementsView, FineTime, LookView, PassEndWord, PassView, RefusedElements, SkyGapView};
+pub use sky::{
+    ElementsUsed, ElementsView, FineTime, LookList, LookView, PassEndWord, PassKept, PassList, PassView,
+    RefusedElements, SkyGapView,
+};
 pub use station::{
     ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView,
 };

@@ -135,6 +135,10 @@ kinds! {
     UnknownKey 404 "unknown-key" "There is no such key";
     /// The satellite can be heard, not commanded.
     NoKey 409 "no-key" "The satellite has no key";
+    /// The configuration does not say where the station stands.
+    NoPlace 409 "no-place" "The station does not know where it stands";
+    /// Nothing says where the satellite is.
+    NoElements 409 "no-elements" "There are no elements";
     /// An argument of a telecommand is wrong.
     BadArgument 422 "bad-argument" "An argument is wrong";
     /// The satellite does not know this telecommand.

@@ -164,6 +164,76 @@ pub struct SkyGapView {
     pub sgp4_code: Option<u8>,
 }
 
+/// The passes of a window of time, computed when they were asked for. Same words as `gs-server passes --json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PassList {
+    /// Station.
+    pub station: String,
+    /// Where the window begins.
+    pub start: FineTime,
+    /// Where it ends.
+    pub stop: FineTime,
+    /// The elevation above which a pass is a pass; where the horizon mask is higher, the mask counts.
+    pub min_elevation_deg: f64,
+    /// The frequency of the Doppler shifts; `null` when none was given.
+    pub frequency_hz: Option<f64>,
+    /// UT1-UTC.
+    pub ut1_minus_utc_s: f64,
+    /// The passes, in order of AOS.
+    pub passes: Vec<PassView>,
+    /// Where the elements have no state.
+    pub gaps: Vec<SkyGapView>,
+    /// Satellites that were asked for and have no elements.
+    pub without_elements: Vec<String>,
+}
+
+/// Where satellites stand at instants, computed when it was asked for. Same words as `gs-server look --json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LookList {
+    /// The frequency of the Doppler shifts; `null` when none was given.
+    pub frequency_hz: Option<f64>,
+    /// UT1-UTC.
+    pub ut1_minus_utc_s: f64,
+    /// For each satellite every instant, in the order in which they were asked for.
+    pub looks: Vec<LookView>,
+    /// Satellites that were asked for and have no elements.
+    pub without_elements: Vec<String>,
+}
+
+/// A pass that began, as it is kept, with the elements it used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PassKept {
+    /// Its number in the archive.
+    pub id: u64,
+    /// Satellite.
+    pub satellite: String,
+    /// Station.
+    pub station: String,
+    /// Acquisition of signal, as the last elements told it.
+    pub aos: FineTime,
+    /// Time of the greatest elevation.
+    pub tca: FineTime,
+    /// Loss of signal; `null` for an object that does not set.
+    pub los: Option<FineTime>,
+    /// Elevation at TCA.
+    pub max_elevation_deg: f64,
+    /// When it ended; `null` while it lasts.
+    pub ended_at: Option<FineTime>,
+    /// The elements it used, in order of time.
+    pub elements: Vec<ElementsUsed>,
+}
+
+/// Elements that a pass used.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ElementsUsed {
+    /// Their number in the archive; `/elements` tells them.
+    pub id: u64,
+    /// Since when the pass went by them.
+    pub from: FineTime,
+    /// Their epoch.
+    pub epoch: FineTime,
+}
+
 /// Where a satellite stands at an instant, seen from a station. Where the elements have no state, `error` says why and
 /// every value is `null`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

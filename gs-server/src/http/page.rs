@@ -16,7 +16,7 @@ macro_rules! files {
 
 files! {
     "api.js" "commands.js" "console.css" "dom.js" "events.js" "favicon.svg" "format.js" "heartbeat.js" "links.js"
-    "main.js" "model.js" "notice.js" "picture.js" "stream.js" "tokens.css" "top.js"
+    "main.js" "model.js" "notice.js" "passes.js" "picture.js" "stream.js" "tokens.css" "top.js"
 }
 
 pub(super) async fn index(headers: HeaderMap) -> Response {

@@ -10,6 +10,7 @@
 //! | `row` | one pass or look of `tle` to its words on the wire |
 //! | `track` | a pass as points for a plot |
 //! | `plot`, `timeline` | [`sky_plot_svg`], [`timeline_svg`] |
+//! | `theme` | a drawing in the dark or the light colours |
 //! | `calendar` | [`icalendar`] |
 //! | `table` | passes and looks for people |
 
@@ -22,16 +23,18 @@ mod row;
 mod source;
 mod svg;
 mod table;
+mod theme;
 mod timeline;
 mod track;
 
 pub use calendar::icalendar;
 pub use looks::{Looks, look_at};
 pub use place::{Place, PlaceError};
-pub use plot::{PlotError, SkyPlot, plot_pass, sky_plot_svg};
+pub use plot::{PlotError, PlotForm, SkyPlot, plot_pass, plot_pass_at, sky_plot_svg};
 pub use predict::{PASSES_MAX, PredictError, Prediction, predict};
-pub use row::{elements_view, fine_time, instant, pass_view};
+pub use row::{elements_of, elements_view, fine_time, instant, pass_view};
 pub use source::{Catalogue, Object};
 pub use table::{look_table, pass_table};
-pub use timeline::{Timeline, timeline_svg};
+pub use theme::Theme;
+pub use timeline::{Timeline, timeline_svg, timeline_svg_of_width};
 pub use track::{SkyTrack, TrackPoint};

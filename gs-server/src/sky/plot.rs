@@ -2,12 +2,12 @@
 
 use api::PassView;
 use tle::propagator::{ElementsError, PropagationError};
-use tle::{EarthOrientation, Elements, HorizonMask, Propagator};
+use tle::{EarthOrientation, Elements, HorizonMask, Propagator, UtcInstant};
 
-use super::{Place, SkyTrack, instant};
-use super::svg::{Anchor, Canvas, Px, svg, token};
+use super::svg::{Anchor, Canvas, Part, Px, svg_part, token};
 use super::table::{clock, day};
 use super::track::TrackPoint;
+use super::{Place, SkyTrack, instant};
 
 const SIZE_PX: (u32, u32) = (600, 720);
 const CENTRE: Px = (300.0, 334.0);
@@ -34,6 +34,11 @@ pub struct SkyPlot<'a> {
 /// mask shaded, the path dimmed where the satellite is in the Earth's shadow.
 #[must_use]
 pub fn sky_plot_svg(plot: &SkyPlot<'_>) -> String {
+    draw(plot, None, PlotForm::Full)
+}
+
+/// `here`: where the satellite is now, when that is to be shown.
+fn draw(plot: &SkyPlot<'_>, here: Option<&TrackPoint>, form: PlotForm) -> String {
     let track = plot.track;
     let title = format!(
         "{} over {}, {} {}Z, {:.0}°",
@@ -43,15 +48,45 @@ pub fn sky_plot_svg(plot: &SkyPlot<'_>) -> String {
         clock(track.aos.at),
         track.tca.elevation_deg
     );
-    svg(SIZE_PX, &title, |canvas| {
-        canvas.text(plot.satellite, (24.0, 26.0), Anchor::Left, 18.0, token("text"));
-        let under = format!("over {}", plot.station);
-        canvas.text(&under, (24.0, 48.0), Anchor::Left, 12.0, token("dim"));
-        canvas.text(&format!("{} UTC", day(track.tca.at)), (576.0, 26.0), Anchor::Right, 14.0, token("dim"));
+    let part = match form {
+        PlotForm::Full => Part { size_px: SIZE_PX, corner_px: (0, 0), part_px: SIZE_PX, text_scale: 1.0 },
+        PlotForm::Compact => {
+            Part { size_px: SIZE_PX, corner_px: (18, 52), part_px: (564, 564), text_scale: 1.8 }
+        }
+    };
+    svg_part(&part, &title, |canvas| {
+        if form == PlotForm::Full {
+            canvas.text(plot.satellite, (24.0, 26.0), Anchor::Left, 18.0, token("text"));
+            let under = format!("over {}", plot.station);
+            canvas.text(&under, (24.0, 48.0), Anchor::Left, 12.0, token("dim"));
+            canvas.text(
+                &format!("{} UTC", day(track.tca.at)),
+                (576.0, 26.0),
+                Anchor::Right,
+                14.0,
+                token("dim"),
+            );
+        }
         dial(canvas, plot.mask);
-        path(canvas, track);
-        legend(canvas, plot);
+        path(canvas, track, form);
+        if let Some(here) = here.filter(|here| here.elevation_deg > LOWEST_DEG) {
+            satellite(canvas, here);
+        }
+        if form == PlotForm::Full {
+            legend(canvas, plot);
+        }
     })
+}
+
+/// How much a plot tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PlotForm {
+    /// With title and a table of AOS, TCA and LOS.
+    #[default]
+    Full,
+    /// The sky alone, with texts that can be read at half the size.
+    Compact,
 }
 
 /// A pass that cannot be drawn: the elements are not those of the pass.
@@ -84,6 +119,40 @@ pub fn plot_pass(
         mask: over.station.mask(),
         track: &track,
     }))
+}
+
+/// [`plot_pass`] with a mark where the satellite stands at `at`, when it is up.
+///
+/// # Errors
+/// When the pass is not of these elements.
+pub fn plot_pass_at(
+    pass: &PassView,
+    elements: &Elements,
+    over: &Place,
+    orientation: EarthOrientation,
+    at: UtcInstant,
+    form: PlotForm,
+) -> Result<String, PlotError> {
+    let propagator = Propagator::new(elements)?;
+    let times = (instant(pass.aos), instant(pass.tca), instant(pass.los));
+    let track = SkyTrack::new(&propagator, &over.station, orientation, times)?;
+    let plot = SkyPlot {
+        satellite: &pass.satellite,
+        station: &pass.station,
+        mask: over.station.mask(),
+        track: &track,
+    };
+    // Outside of the pass there is nothing to mark.
+    let is_up = times.0 <= at && at <= times.2;
+    let here = is_up.then(|| TrackPoint::at(&propagator, &over.station, orientation, at));
+    Ok(draw(&plot, here.and_then(Result::ok).as_ref(), form))
+}
+
+/// The satellite itself: a filled dot in a ring, the largest mark of the plot.
+fn satellite(canvas: &Canvas<'_>, here: &TrackPoint) {
+    canvas.disc(of(here), 9.0, token("ground"));
+    canvas.ring(of(here), 9.0, token("accent"), 2.0);
+    canvas.disc(of(here), 5.0, token("accent"));
 }
 
 fn place(azimuth_deg: f64, elevation_deg: f64) -> Px {
@@ -131,7 +200,7 @@ fn dial(canvas: &Canvas<'_>, mask: &HorizonMask) {
     }
 }
 
-fn path(canvas: &Canvas<'_>, track: &SkyTrack) {
+fn path(canvas: &Canvas<'_>, track: &SkyTrack, form: PlotForm) {
     // A piece per stretch of light or shadow; neighbours share a point, so that no gap shows.
     let mut from = 0;
     for (index, pair) in track.path.windows(2).enumerate() {
@@ -139,31 +208,29 @@ fn path(canvas: &Canvas<'_>, track: &SkyTrack) {
         if pair[0].sunlit != pair[1].sunlit || is_last {
             let until = if is_last { index + 1 } else { index };
             let piece: Vec<Px> = track.path[from..=until].iter().map(of).collect();
-            let colour = if track.path[from].sunlit { token("accent") } else { token("dim") };
+            let colour = if pair[0].sunlit { token("accent") } else { token("dim") };
             canvas.line(&piece, colour, 2.0);
             from = until;
         }
     }
-    let every = track.ticks.len().div_ceil(LABELS_MAX).max(1);
+    // Larger labels need more room, outwards as well.
+    let (labels, room) = if form == PlotForm::Full { (LABELS_MAX, 1.0) } else { (LABELS_MAX / 2, 1.6) };
+    let every = track.ticks.len().div_ceil(labels).max(1);
     for (index, tick) in track.ticks.iter().enumerate() {
         let at = of(tick);
         let along = direction(track, tick);
         let across = (-along.1, along.0);
         canvas.line(
-            &[
-                (at.0 - 4.0 * across.0, at.1 - 4.0 * across.1),
-                (at.0 + 4.0 * across.0, at.1 + 4.0 * across.1),
-            ],
+            &[(at.0 - 4.0 * across.0, at.1 - 4.0 * across.1), (at.0 + 4.0 * across.0, at.1 + 4.0 * across.1)],
             token("text"),
             1.0,
         );
-        let near_mark =
-            [&track.aos, &track.tca, &track.los].iter().any(|mark| distance(of(mark), at) < 16.0);
+        let near_mark = [&track.aos, &track.tca, &track.los].iter().any(|mark| distance(of(mark), at) < 34.0 * room);
         if index % every == every / 2 && !near_mark {
             // On the side away from the zenith, where there is room.
             let outwards =
                 if (at.0 - CENTRE.0) * across.0 + (at.1 - CENTRE.1) * across.1 < 0.0 { -1.0 } else { 1.0 };
-            let (dx, dy) = (across.0 * outwards * 9.0, across.1 * outwards * 11.0);
+            let (dx, dy) = (across.0 * outwards * 9.0 * room, across.1 * outwards * 11.0 * room);
             let anchor = side(dx);
             let label = clock(tick.at);
             canvas.text(&label[..5], (at.0 + dx, at.1 + dy), anchor, 11.0, token("dim"));
@@ -197,16 +264,19 @@ fn path(canvas: &Canvas<'_>, track: &SkyTrack) {
     }
 }
 
-/// Which way the satellite goes, half-way between TCA and LOS.
+/// Which way the satellite goes.
 fn arrow(canvas: &Canvas<'_>, track: &SkyTrack) {
-    let at = track.path.len() * 7 / 8;
+    let at = track.path.len() * 7 / 10;
     let Some(point) = track.path.get(at) else { return };
     let (tip, along) = (of(point), direction(track, point));
     let across = (-along.1, along.0);
     let corner = |side: f64| {
         (tip.0 - 10.0 * along.0 + side * 5.0 * across.0, tip.1 - 10.0 * along.1 + side * 5.0 * across.1)
     };
-    canvas.polygon(&[tip, corner(1.0), corner(-1.0)], if point.sunlit { token("accent") } else { token("dim") });
+    canvas.polygon(
+        &[tip, corner(1.0), corner(-1.0)],
+        if point.sunlit { token("accent") } else { token("dim") },
+    );
 }
 
 /// The path's direction on the picture, of length 1.
@@ -232,7 +302,8 @@ fn side(dx: f64) -> Anchor {
 }
 
 fn legend(canvas: &Canvas<'_>, plot: &SkyPlot<'_>) {
-    let columns = [(64.0, Anchor::Left), (216.0, Anchor::Right), (306.0, Anchor::Right), (396.0, Anchor::Right)];
+    let columns =
+        [(64.0, Anchor::Left), (216.0, Anchor::Right), (306.0, Anchor::Right), (396.0, Anchor::Right)];
     let row = |y: f64, cells: [&str; 5], colour: &str| {
         canvas.text(cells[0], (24.0, y), Anchor::Left, 12.0, token("dim"));
         for (cell, (x, anchor)) in cells[1..].iter().zip(columns) {
@@ -253,8 +324,7 @@ fn legend(canvas: &Canvas<'_>, plot: &SkyPlot<'_>) {
     }
     let mut y = 656.0;
     let has = |lit: bool| plot.track.path.iter().any(|point| point.sunlit == lit);
-    for (is_there, colour, words) in
-        [(has(true), "accent", "in sunlight"), (has(false), "dim", "in shadow")]
+    for (is_there, colour, words) in [(has(true), "accent", "in sunlight"), (has(false), "dim", "in shadow")]
     {
         if is_there {
             canvas.line(&[(450.0, y), (474.0, y)], token(colour), 2.0);

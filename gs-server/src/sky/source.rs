@@ -20,6 +20,23 @@ impl Object {
         Self { sets: vec![elements] }
     }
 
+    /// An object known by these sets; of two with one epoch the later one counts. `None` without any.
+    #[must_use]
+    pub fn of_sets(mut sets: Vec<Elements>) -> Option<Self> {
+        sets.sort_by_key(|set| set.epoch);
+        (!sets.is_empty()).then_some(Self { sets })
+    }
+
+    /// An object with all its sets under a name of ours; `None` without a set.
+    #[must_use]
+    pub fn named(name: &str, mut sets: Vec<Elements>) -> Option<Self> {
+        sets.sort_by_key(|set| set.epoch);
+        for set in &mut sets {
+            set.name = Some(name.to_owned());
+        }
+        (!sets.is_empty()).then_some(Self { sets })
+    }
+
     /// All sets, in the order of their epochs.
     #[must_use]
     pub fn sets(&self) -> &[Elements] {
@@ -150,7 +167,8 @@ impl Catalogue {
     fn not_found(&self, name: &str) -> String {
         let lower = name.trim().to_lowercase();
         let labels = || self.objects.iter().map(Object::label);
-        let mut near: Vec<_> = labels().filter(|label| label.to_lowercase().contains(&lower)).take(5).collect();
+        let mut near: Vec<_> =
+            labels().filter(|label| label.to_lowercase().contains(&lower)).take(5).collect();
         if near.is_empty() {
             near = labels().take(5).collect();
         }

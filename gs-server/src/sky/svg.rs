@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontDesc, FontFamily, FontStyle, RGBAColor, ShapeStyle, TextStyle};
 
 /// The one file that has colours.
-const TOKENS: &str = include_str!("../http/page/tokens.css");
+pub(super) const TOKENS: &str = include_str!("../http/page/tokens.css");
 /// The backend knows whole numbers only; so many of them make a pixel.
 const UNITS_PER_PX: f64 = 16.0;
 /// The backend writes a font as so much smaller than it was asked for.
@@ -47,23 +47,53 @@ pub(super) enum Anchor {
 pub(super) struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
     is_whole: Cell<bool>,
+    /// How much larger texts are than they say.
+    text_scale: f64,
 }
 
 /// Draws a picture of so many pixels on the console's ground. `title` is read aloud and shown where a pointer rests.
 pub(super) fn svg(size_px: (u32, u32), title: &str, draw: impl FnOnce(&Canvas<'_>)) -> String {
+    svg_part(&Part { size_px, corner_px: (0, 0), part_px: size_px, text_scale: 1.0 }, title, draw)
+}
+
+/// A part of a picture, to be shown small: with texts that are larger for it.
+pub(super) struct Part {
+    /// The whole picture.
+    pub(super) size_px: (u32, u32),
+    /// Upper left corner of the part.
+    pub(super) corner_px: (u32, u32),
+    /// Size of the part.
+    pub(super) part_px: (u32, u32),
+    /// How much larger texts are.
+    pub(super) text_scale: f64,
+}
+
+/// [`svg`] of which only a part shows.
+pub(super) fn svg_part(part: &Part, title: &str, draw: impl FnOnce(&Canvas<'_>)) -> String {
     let units = |px: u32| px.saturating_mul(UNITS_PER_PX as u32);
+    let (width, height) = (units(part.size_px.0), units(part.size_px.1));
     let mut text = String::new();
     let canvas = Canvas {
-        area: SVGBackend::with_string(&mut text, (units(size_px.0), units(size_px.1))).into_drawing_area(),
+        area: SVGBackend::with_string(&mut text, (width, height)).into_drawing_area(),
         is_whole: Cell::new(true),
+        text_scale: part.text_scale,
     };
-    canvas.rectangle((0.0, 0.0), (f64::from(size_px.0), f64::from(size_px.1)), token("ground"));
+    canvas.rectangle((0.0, 0.0), (f64::from(part.size_px.0), f64::from(part.size_px.1)), token("ground"));
     draw(&canvas);
     canvas.done(|| canvas.area.present());
     debug_assert!(canvas.is_whole.get(), "the backend writes into memory, which cannot fail");
     drop(canvas);
-    let head = format!("<svg width=\"{}\" height=\"{}\"", units(size_px.0), units(size_px.1));
-    let wanted = format!("<svg width=\"{}\" height=\"{}\" role=\"img\"", size_px.0, size_px.1);
+    let head = format!("<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\"");
+    let wanted = format!(
+        "<svg width=\"{}\" height=\"{}\" role=\"img\" viewBox=\"{} {} {} {}\"",
+        part.part_px.0,
+        part.part_px.1,
+        units(part.corner_px.0),
+        units(part.corner_px.1),
+        units(part.part_px.0),
+        units(part.part_px.1)
+    );
+    debug_assert!(text.starts_with(&head), "the backend's first line is another: {text:.80}");
     let text = text.replacen(&head, &wanted, 1);
     text.replacen(">\n", &format!(">\n<title>{}</title>\n", escaped(title)), 1)
 }
@@ -92,7 +122,10 @@ impl Canvas<'_> {
 
     pub(super) fn line(&self, points: &[Px], colour: RGBAColor, width_px: f64) {
         if points.len() > 1 {
-            self.draw(&PathElement::new(points.iter().map(units).collect::<Vec<_>>(), stroke(colour, width_px)));
+            self.draw(&PathElement::new(
+                points.iter().map(units).collect::<Vec<_>>(),
+                stroke(colour, width_px),
+            ));
         }
     }
 
@@ -117,7 +150,7 @@ impl Canvas<'_> {
     /// Text whose middle line lies at `at`.
     pub(super) fn text(&self, text: &str, at: Px, anchor: Anchor, size_px: f64, colour: RGBAColor) {
         let font =
-            FontDesc::new(FontFamily::SansSerif, size_px * UNITS_PER_PX * FONT_FACTOR, FontStyle::Normal);
+            FontDesc::new(FontFamily::SansSerif, size_px * self.text_scale * UNITS_PER_PX * FONT_FACTOR, FontStyle::Normal);
         let across = match anchor {
             Anchor::Left => HPos::Left,
             Anchor::Middle => HPos::Center,
@@ -152,7 +185,10 @@ mod tests {
         });
         assert!(!drawn.contains("<script") && !drawn.contains('\u{0}'), "{drawn}");
         assert!(drawn.contains("<title>&lt;script&gt;") && drawn.trim_end().ends_with("</svg>"), "{drawn}");
-        assert!(drawn.starts_with("<svg width=\"100\" height=\"50\" role=\"img\" viewBox=\"0 0 1600 800\""), "{drawn}");
+        assert!(
+            drawn.starts_with("<svg width=\"100\" height=\"50\" role=\"img\" viewBox=\"0 0 1600 800\""),
+            "{drawn}"
+        );
     }
 
     #[test]

@@ -9,9 +9,13 @@ use super::svg::{Anchor, Canvas, Px, svg, token};
 use super::table::{clock, day};
 
 const WIDTH_PX: u32 = 1080;
+/// Narrower than this, names stand above their lanes and not beside them.
+const NARROW_PX: u32 = 640;
 const LEFT_PX: f64 = 190.0;
-const RIGHT_PX: f64 = 1056.0;
+const MARGIN_PX: f64 = 24.0;
 const TOP_PX: f64 = 84.0;
+/// Room for a name above its lane.
+const NAME_PX: f64 = 18.0;
 const LANE_PX: f64 = 44.0;
 /// Lanes that are drawn.
 const LANES_MAX: usize = 60;
@@ -32,6 +36,34 @@ pub struct Timeline<'a> {
     pub passes: &'a [PassView],
 }
 
+/// What is drawn on: the timeline, and where its bars may stand.
+struct Sheet<'a> {
+    timeline: &'a Timeline<'a>,
+    is_narrow: bool,
+    left: f64,
+    right: f64,
+    lane: f64,
+}
+
+impl<'a> Sheet<'a> {
+    fn new(timeline: &'a Timeline<'a>, width_px: u32) -> Self {
+        let is_narrow = width_px < NARROW_PX;
+        Self {
+            timeline,
+            is_narrow,
+            left: if is_narrow { MARGIN_PX } else { LEFT_PX },
+            right: f64::from(width_px) - MARGIN_PX,
+            lane: if is_narrow { LANE_PX + NAME_PX } else { LANE_PX },
+        }
+    }
+
+    fn x_of(&self, at: UtcInstant) -> f64 {
+        let whole = self.timeline.stop.seconds_since(self.timeline.start).max(1e-6);
+        self.left
+            + (self.right - self.left) * (at.seconds_since(self.timeline.start) / whole).clamp(0.0, 1.0)
+    }
+}
+
 /// One line of bars.
 struct Lane<'a> {
     station: &'a str,
@@ -43,9 +75,17 @@ struct Lane<'a> {
 /// Draws a bar for each pass, as high as the pass is (full height: the zenith), a lane for each station and satellite.
 #[must_use]
 pub fn timeline_svg(timeline: &Timeline<'_>) -> String {
+    timeline_svg_of_width(timeline, WIDTH_PX)
+}
+
+/// [`timeline_svg`] for a page or screen of this width; the least is 280.
+#[must_use]
+pub fn timeline_svg_of_width(timeline: &Timeline<'_>, width_px: u32) -> String {
+    let width_px = width_px.clamp(280, 4000);
+    let sheet = Sheet::new(timeline, width_px);
     let lanes = lanes(timeline.passes);
     let drawn = lanes.len().clamp(1, LANES_MAX);
-    let bottom = TOP_PX + LANE_PX * drawn as f64;
+    let bottom = TOP_PX + sheet.lane * drawn as f64;
     let height = bottom + if lanes.len() > LANES_MAX { 52.0 } else { 32.0 };
     let title = format!(
         "{} passes, {} {}Z to {} {}Z",
@@ -55,16 +95,18 @@ pub fn timeline_svg(timeline: &Timeline<'_>) -> String {
         day(timeline.stop),
         clock(timeline.stop)
     );
-    svg((WIDTH_PX, height.ceil() as u32), &title, |canvas| {
+    svg((width_px, height.ceil() as u32), &title, |canvas| {
         canvas.text("Passes", (24.0, 26.0), Anchor::Left, 18.0, token("text"));
-        let words = "height of a bar: greatest elevation, 90° is the whole lane";
-        canvas.text(words, (RIGHT_PX, 26.0), Anchor::Right, 12.0, token("dim"));
-        axis(canvas, timeline, bottom);
+        if !sheet.is_narrow {
+            let words = "height of a bar: greatest elevation, 90° is the whole lane";
+            canvas.text(words, (sheet.right, 26.0), Anchor::Right, 12.0, token("dim"));
+        }
+        axis(canvas, &sheet, bottom);
         for (index, lane) in lanes.iter().take(LANES_MAX).enumerate() {
-            draw_lane(canvas, timeline, lane, TOP_PX + LANE_PX * index as f64);
+            draw_lane(canvas, &sheet, lane, TOP_PX + sheet.lane * index as f64);
         }
         if lanes.is_empty() {
-            let middle = (f64::midpoint(LEFT_PX, RIGHT_PX), TOP_PX + LANE_PX / 2.0);
+            let middle = (f64::midpoint(sheet.left, sheet.right), TOP_PX + sheet.lane / 2.0);
             canvas.text("no passes in this time", middle, Anchor::Middle, 14.0, token("dim"));
         }
         if lanes.len() > LANES_MAX {
@@ -107,45 +149,53 @@ fn lanes(passes: &[PassView]) -> Vec<Lane<'_>> {
         .collect()
 }
 
-fn x_of(timeline: &Timeline<'_>, at: UtcInstant) -> f64 {
-    let whole = timeline.stop.seconds_since(timeline.start).max(1e-6);
-    LEFT_PX + (RIGHT_PX - LEFT_PX) * (at.seconds_since(timeline.start) / whole).clamp(0.0, 1.0)
-}
-
 /// UTC above the lanes: times at the hours, dates at midnight.
-fn axis(canvas: &Canvas<'_>, timeline: &Timeline<'_>, bottom: f64) {
+fn axis(canvas: &Canvas<'_>, sheet: &Sheet<'_>, bottom: f64) {
+    let timeline = sheet.timeline;
     let window_us = timeline.stop.us_since(timeline.start).max(1);
-    // At most 16 labels fit.
+    // A label takes 54 pixels.
+    let most = ((sheet.right - sheet.left) / 54.0) as i64 - 1;
     let step_us = [5, 10, 15, 30, 60, 120, 180, 360, 720, 1440]
         .into_iter()
         .map(|minutes| minutes * HOUR_US / 60)
-        .find(|step| window_us / step <= 15)
-        .unwrap_or_else(|| 24 * HOUR_US * (1 + window_us / (24 * HOUR_US * 15)));
-    canvas.text("UTC", (24.0, 66.0), Anchor::Left, 12.0, token("dim"));
+        .find(|step| window_us / step <= most)
+        .unwrap_or_else(|| 24 * HOUR_US * (1 + window_us / (24 * HOUR_US * most.max(1))));
+    if !sheet.is_narrow {
+        canvas.text("UTC", (24.0, 66.0), Anchor::Left, 12.0, token("dim"));
+    }
     let first = timeline.start.unix_us().div_euclid(step_us) + 1;
-    canvas.text(&day(timeline.start), (LEFT_PX, 48.0), Anchor::Left, 12.0, token("text"));
+    let date = format!("{}{}", day(timeline.start), if sheet.is_narrow { " UTC" } else { "" });
+    canvas.text(&date, (sheet.left, 48.0), Anchor::Left, 12.0, token("text"));
+    let taken = if sheet.is_narrow { 136.0 } else { 110.0 };
     for tick in first..=timeline.stop.unix_us().div_euclid(step_us) {
         let at = UtcInstant::from_unix_us(tick * step_us);
-        let x = x_of(timeline, at);
+        let x = sheet.x_of(at);
         let is_midnight = (tick * step_us).rem_euclid(24 * HOUR_US) == 0;
         let colour = if is_midnight { token("faint") } else { token("edge") };
         canvas.line(&[(x, 74.0), (x, bottom)], colour, 1.0);
-        if is_midnight && x - LEFT_PX > 76.0 && RIGHT_PX - x > 30.0 {
+        if is_midnight && x - sheet.left > taken && sheet.right - x > 12.0 {
             canvas.text(&day(at), (x, 48.0), Anchor::Middle, 12.0, token("text"));
         }
         canvas.text(&clock(at)[..5], (x, 66.0), Anchor::Middle, 12.0, token("dim"));
     }
 }
 
-fn draw_lane(canvas: &Canvas<'_>, timeline: &Timeline<'_>, lane: &Lane<'_>, top: f64) {
-    let base = top + LANE_PX - 4.0;
-    canvas.line(&[(24.0, base), (RIGHT_PX, base)], token("edge"), 1.0);
-    let name = lane.satellite.map_or_else(|| format!("{} passes", lane.passes.len()), |name| fitting(name, 24));
-    canvas.text(&name, (24.0, base - 25.0), Anchor::Left, 12.0, token("text"));
-    canvas.text(&fitting(lane.station, 26), (24.0, base - 10.0), Anchor::Left, 11.0, token("dim"));
+fn draw_lane(canvas: &Canvas<'_>, sheet: &Sheet<'_>, lane: &Lane<'_>, top: f64) {
+    let base = top + sheet.lane - 4.0;
+    canvas.line(&[(24.0, base), (sheet.right, base)], token("edge"), 1.0);
+    let name =
+        lane.satellite.map_or_else(|| format!("{} passes", lane.passes.len()), |name| fitting(name, 24));
+    if sheet.is_narrow {
+        let both = format!("{name} over {}", fitting(lane.station, 20));
+        canvas.text(&both, (24.0, top + 10.0), Anchor::Left, 11.0, token("text"));
+    } else {
+        canvas.text(&name, (24.0, base - 25.0), Anchor::Left, 12.0, token("text"));
+        canvas.text(&fitting(lane.station, 26), (24.0, base - 10.0), Anchor::Left, 11.0, token("dim"));
+    }
+    let top = base + 4.0 - LANE_PX;
     let mut free_from = f64::MIN;
     for pass in lane.passes.iter().take(BARS_MAX) {
-        let (from, until) = (x_of(timeline, instant(pass.aos)), x_of(timeline, instant(pass.los)));
+        let (from, until) = (sheet.x_of(instant(pass.aos)), sheet.x_of(instant(pass.los)));
         let until = until.max(from + 2.0);
         let height = (LANE_PX - 16.0) * (pass.max_elevation_deg / 90.0).clamp(0.04, 1.0);
         let colour = token("accent");
@@ -160,7 +210,7 @@ fn draw_lane(canvas: &Canvas<'_>, timeline: &Timeline<'_>, lane: &Lane<'_>, top:
         let label = format!("{:.0}°", pass.max_elevation_deg);
         let middle: Px = (f64::midpoint(from, until), base - height - 7.0);
         let half = 3.5 * label.chars().count() as f64;
-        if middle.0 - half > free_from && middle.0 + half <= RIGHT_PX + 12.0 {
+        if middle.0 - half > free_from && middle.0 + half <= sheet.right + 12.0 {
             canvas.text(&label, middle, Anchor::Middle, 10.0, token("dim"));
             free_from = middle.0 + half + 2.0;
         }

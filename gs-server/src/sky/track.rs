@@ -25,6 +25,29 @@ pub struct TrackPoint {
     pub sunlit: bool,
 }
 
+impl TrackPoint {
+    /// Where the satellite stands at an instant.
+    ///
+    /// # Errors
+    /// No state there.
+    pub fn at(
+        propagator: &Propagator,
+        station: &Station,
+        orientation: EarthOrientation,
+        at: UtcInstant,
+    ) -> Result<Self, PropagationError> {
+        let state = propagator.at(at)?;
+        let look = station.look(&ecef_from_teme(&state, gmst_rad(at, orientation)));
+        Ok(Self {
+            at,
+            azimuth_deg: look.azimuth_deg,
+            elevation_deg: look.elevation_deg,
+            range_km: look.range_km,
+            sunlit: light(state.r_teme_km, at) == Light::Sunlit,
+        })
+    }
+}
+
 /// The way of a satellite across a station's sky.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkyTrack {
@@ -51,17 +74,7 @@ impl SkyTrack {
         orientation: EarthOrientation,
         (aos, tca, los): (UtcInstant, UtcInstant, UtcInstant),
     ) -> Result<Self, PropagationError> {
-        let point = |at: UtcInstant| -> Result<TrackPoint, PropagationError> {
-            let state = propagator.at(at)?;
-            let look = station.look(&ecef_from_teme(&state, gmst_rad(at, orientation)));
-            Ok(TrackPoint {
-                at,
-                azimuth_deg: look.azimuth_deg,
-                elevation_deg: look.elevation_deg,
-                range_km: look.range_km,
-                sunlit: light(state.r_teme_km, at) == Light::Sunlit,
-            })
-        };
+        let point = |at: UtcInstant| TrackPoint::at(propagator, station, orientation, at);
         let duration_s = los.seconds_since(aos);
         // A pass that ends where the elements end may have no state at its very last moment.
         let path: Vec<TrackPoint> = (0..=PATH_POINTS)

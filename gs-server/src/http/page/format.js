@@ -29,3 +29,16 @@ export function number(value, digits = 2) {
   if (Math.abs(value) >= 1e6) return value.toExponential(2);
   return value.toFixed(digits);
 }
+
+/** `00:04:12`, `2 d 03:04:05` */
+export function countdown(duration) {
+  const s = Math.max(0, Math.ceil(duration / 1000));
+  const days = Math.floor(s / 86400);
+  const time = `${two(Math.floor(s / 3600) % 24)}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)}`;
+  return days > 0 ? `${days} d ${time}` : time;
+}
+
+const WINDS = ["N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW"];
+
+/** An azimuth as the wind it comes from: `NNE` */
+export const wind = (degrees) => WINDS[Math.round((((degrees % 360) + 360) % 360) / 22.5) % 16];

@@ -6,6 +6,7 @@ import { paintHeartbeat, refreshHeartbeat } from "./heartbeat.js";
 import { paintLinks } from "./links.js";
 import { model, satellite, takeStation } from "./model.js";
 import { paintNotice } from "./notice.js";
+import { paintPasses } from "./passes.js";
 import { paintGrid, refreshPicture, resetPicture } from "./picture.js";
 import { follow } from "./stream.js";
 import { paintTop } from "./top.js";
@@ -21,6 +22,7 @@ window.addEventListener("resize", paintGrid);
 
 function paint() {
   paintTop();
+  paintPasses();
   paintHeartbeat();
   paintCommands();
   paintLinks();
@@ -78,7 +80,7 @@ async function begin() {
       imageSeen = "";
     },
   });
-  setInterval(paint, 500);
+  setInterval(paint, 250);
 }
 
 async function beginUntilItWorks() {

@@ -1,5 +1,8 @@
 // What the page knows. The views read it; the stream and the answers of the API write it.
 
+// The server says how it stands at least this often.
+const WORD_MS = 1000;
+
 export const model = {
   station: null, // newest StationView
   receivedAt: 0, // performance.now() when it came
@@ -8,12 +11,22 @@ export const model = {
   satellite: null, // name of the satellite shown
 };
 
-/** The station's time now, in ms. Simulated time is not guessed: it stands where it was last told. */
+let shown = -Infinity;
+
+/**
+ * The station's time now, in ms, by the server's clock: this browser's clock only counts from its last word. Simulated
+ * time goes on at the speed that the server tells, until its next word is due; without one it stands where it was told.
+ */
 export function now() {
   const { station, receivedAt } = model;
   if (!station) return null;
   const told = Date.parse(station.at);
-  return station.simulated ? told : told + (performance.now() - receivedAt);
+  const speed = station.simulated ? (station.demo?.speed ?? 0) : 1;
+  const since = performance.now() - receivedAt;
+  const guess = told + speed * (station.simulated ? Math.min(since, WORD_MS) : since);
+  // A clock that stood still meanwhile is behind the guess: the shown time waits for it and does not run backwards.
+  shown = shown > guess && shown - guess < 2 * speed * WORD_MS ? shown : guess;
+  return shown;
 }
 
 /** The satellite that is shown. */

@@ -2,6 +2,7 @@
 import { byId, say } from "./dom.js";
 import { clock, date, ms, span } from "./format.js";
 import { model, now, satellite } from "./model.js";
+import { passClock } from "./passes.js";
 
 export function paintTop() {
   const { station } = model;
@@ -19,6 +20,7 @@ export function paintTop() {
   const heard = ms(s.heard_at);
   // While the server is away nobody knows how things stand: no age is made up, no lamp claims anything.
   const isAway = model.awaySince !== null;
+  say(byId("pass-clock"), (isAway ? null : passClock(s, t)) ?? "—");
   say(byId("contact"), isAway ? "unknown" : contact(s, t));
   const age = isAway ? `${clock(heard)} UTC` : `${span(t - heard)} ago`;
   say(byId("link-lamp"), heard === null ? "nothing yet" : age);
