@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use std::time::SystemTime;
 
 /// Crates whose source goes into the binary.
-const ROOMS: [&str; 8] =
-    ["protocol", "radio", "mission", "satellite", "rehearsal", "api", "migrations", "gs-server"];
+const ROOMS: [&str; 9] =
+    ["protocol", "tle", "radio", "mission", "satellite", "rehearsal", "api", "migrations", "gs-server"];
 
 /// The root of the workspace.
 ///

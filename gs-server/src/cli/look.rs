@@ -31,7 +31,13 @@ pub struct Look {
     #[command(flatten)]
     sky: SkyArgs,
     /// Instants, UTC, divided by commas; a distance such as +10m counts from now
-    #[arg(long, value_name = "T,T,...", default_value = "now", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "T,T,...",
+        default_value = "now",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
     at: Vec<Moment>,
 }
 
@@ -48,7 +54,9 @@ impl Look {
     pub(super) fn run(self) -> Result<Exit, Failure> {
         let now = now();
         let at: Vec<UtcInstant> = self.at.iter().map(|moment| moment.resolve(now, now)).collect();
-        let sky = self.sky.read()?;
+        let first = at.iter().min().copied().unwrap_or(now);
+        let last = at.iter().max().copied().unwrap_or(now);
+        let sky = self.sky.read((first, last))?;
         let objects = &sky.catalogue.objects;
         let count = objects.len().saturating_mul(sky.places.len()).saturating_mul(at.len());
         if count > LOOKS_MAX {
@@ -60,7 +68,7 @@ impl Look {
             objects,
             places: &sky.places,
             at: &at,
-            orientation: self.sky.dut1,
+            orientation: sky.orientation,
             frequency_hz: self.sky.frequency,
         })
         .map_err(Failure::failed)?;
@@ -68,7 +76,7 @@ impl Look {
         if self.sky.json {
             print_json(&Answer {
                 frequency_hz: self.sky.frequency,
-                ut1_minus_utc_s: self.sky.dut1.ut1_minus_utc_s(),
+                ut1_minus_utc_s: sky.orientation.ut1_minus_utc_s(),
                 looks,
                 refused: sky.catalogue.refused,
             })?;

@@ -49,9 +49,10 @@ pub struct Passes {
     /// End of the window, UTC
     #[arg(long, value_name = "T", default_value = "+24h", allow_hyphen_values = true)]
     stop: Moment,
-    /// Elevation above which a pass is a pass, degrees; where a station has a mask, the higher counts
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
-    min_elevation: f64,
+    /// Elevation above which a pass is a pass, degrees; 0, or what the configuration says. Where a station has a mask, the
+    /// higher counts
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    min_elevation: Option<f64>,
     /// Write the sky plot of the highest pass; into a folder: of every pass
     #[arg(long, value_name = "FILE or DIR")]
     svg: Option<PathBuf>,
@@ -82,16 +83,17 @@ impl Passes {
         let now = now();
         let start = self.start.resolve(now, now);
         let stop = self.stop.resolve(now, start);
-        let search = PassSearch { orientation: self.sky.dut1, ..PassSearch::new(start, stop, self.min_elevation) };
         // What cannot be searched is said before anything is read.
-        search_nothing(&search)?;
-        let sky = self.sky.read()?;
+        search_nothing(&PassSearch::new(start, stop, self.min_elevation.unwrap_or_default()))?;
+        let sky = self.sky.read((start, stop))?;
+        let min_elevation_deg = self.min_elevation.unwrap_or(sky.min_elevation_deg);
+        let search =
+            PassSearch { orientation: sky.orientation, ..PassSearch::new(start, stop, min_elevation_deg) };
         let found = self.search(&sky, &search)?;
         tell(
-            found
-                .gaps
-                .iter()
-                .map(|gap| format!("{}: no state from {} to {}: {}", gap.satellite, gap.from, gap.until, gap.error)),
+            found.gaps.iter().map(|gap| {
+                format!("{}: no state from {} to {}: {}", gap.satellite, gap.from, gap.until, gap.error)
+            }),
             "stretches without a state",
         );
         self.write(&sky, &search, &found, now)?;
@@ -100,9 +102,9 @@ impl Passes {
             print_json(&Answer {
                 start: fine_time(start),
                 stop: fine_time(stop),
-                min_elevation_deg: self.min_elevation,
+                min_elevation_deg,
                 frequency_hz: self.sky.frequency,
-                ut1_minus_utc_s: self.sky.dut1.ut1_minus_utc_s(),
+                ut1_minus_utc_s: sky.orientation.ut1_minus_utc_s(),
                 satellites: sky.catalogue.objects.len(),
                 passes: found.passes,
                 gaps: found.gaps,
@@ -136,7 +138,13 @@ impl Passes {
         found.map_err(failure)
     }
 
-    fn write(&self, sky: &Sky, search: &PassSearch, found: &Prediction, now: UtcInstant) -> Result<(), Failure> {
+    fn write(
+        &self,
+        sky: &Sky,
+        search: &PassSearch,
+        found: &Prediction,
+        now: UtcInstant,
+    ) -> Result<(), Failure> {
         if let Some(path) = &self.svg {
             write_plots(path, sky, search, &found.passes)?;
         }
@@ -159,7 +167,9 @@ fn search_nothing(search: &PassSearch) -> Result<(), Failure> {
 
 fn failure(error: PredictError) -> Failure {
     match error {
-        PredictError::Search(SearchError::Stopped { .. }) | PredictError::Elements { .. } => Failure::failed(error),
+        PredictError::Search(SearchError::Stopped { .. }) | PredictError::Elements { .. } => {
+            Failure::failed(error)
+        }
         PredictError::Search(_) | PredictError::TooMany => Failure::usage(error),
     }
 }
@@ -168,7 +178,9 @@ fn write_plots(path: &Path, sky: &Sky, search: &PassSearch, passes: &[PassView])
     if !path.is_dir() {
         let best = passes.iter().max_by(|a, b| a.max_elevation_deg.total_cmp(&b.max_elevation_deg));
         let Some(best) = best else {
-            return Err(Failure::failed("there is no pass to draw: choose a longer window or a lower elevation"));
+            return Err(Failure::failed(
+                "there is no pass to draw: choose a longer window or a lower elevation",
+            ));
         };
         return write_file(path, &plot(sky, search, best)?);
     }
@@ -192,9 +204,8 @@ fn plot(sky: &Sky, search: &PassSearch, pass: &PassView) -> Result<String, Failu
             && object.norad_cat_id() == pass.norad_cat_id
             && object.sets().iter().any(|set| fine_time(set.epoch) == pass.epoch)
     });
-    let set = object.and_then(|object| {
-        object.sets().iter().rev().find(|set| fine_time(set.epoch) == pass.epoch)
-    });
+    let set =
+        object.and_then(|object| object.sets().iter().rev().find(|set| fine_time(set.epoch) == pass.epoch));
     let place = sky.places.iter().find(|place| place.name == pass.station);
     let (Some(set), Some(place)) = (set, place) else {
         return Err(Failure::failed(format!("the elements of {} are gone", pass.satellite)));

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
@@ -11,11 +11,19 @@ use tle::formats::Checksums;
 use tle::{EarthOrientation, UtcInstant};
 
 use super::Failure;
+use super::shell::runtime;
 use crate::clock::SystemClock;
-use crate::sky::{Catalogue, Place};
+use crate::config::Config;
+use crate::elements::Remote;
+use crate::elements::offline::archive;
+use crate::run::RunError;
+use crate::sky::{Catalogue, Object, Place, elements_of};
+use crate::storage::{ElementsRow, StoreError};
 
 /// Bytes of a file of elements: 30,000 objects as XML are 50 MB.
 const FILE_BYTES_MAX: u64 = 256 << 20;
+/// Sets of one satellite that are read from an archive.
+const SETS_MAX: u32 = 1000;
 /// Refused sets, warnings and gaps that are told one by one.
 const TOLD_MAX: usize = 20;
 
@@ -29,8 +37,8 @@ pub(super) struct SkyArgs {
     /// times
     #[arg(long, value_name = "STATION", allow_hyphen_values = true)]
     station: Vec<Place>,
-    /// Without --elements: the configuration with the station and the archive of its elements
-    #[arg(long, value_name = "FILE", env = "GS_CONFIG", hide_env_values = true)]
+    /// Without --elements: the configuration of a station, for its place and the elements that it holds
+    #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Only this one: name, catalogue number or designator; may be given several times
     #[arg(long, value_name = "SATELLITE")]
@@ -41,9 +49,9 @@ pub(super) struct SkyArgs {
     /// Frequency for the Doppler shifts, Hz
     #[arg(long, value_name = "HZ", value_parser = frequency)]
     pub(super) frequency: Option<f64>,
-    /// UT1-UTC, s
-    #[arg(long, value_name = "S", default_value = "0", value_parser = dut1, allow_hyphen_values = true)]
-    pub(super) dut1: EarthOrientation,
+    /// UT1-UTC, s; 0, or what the configuration says
+    #[arg(long, value_name = "S", value_parser = dut1, allow_hyphen_values = true)]
+    dut1: Option<EarthOrientation>,
     /// One JSON object
     #[arg(long)]
     pub(super) json: bool,
@@ -53,13 +61,27 @@ pub(super) struct SkyArgs {
 pub(super) struct Sky {
     pub(super) catalogue: Catalogue,
     pub(super) places: Vec<Place>,
+    pub(super) orientation: EarthOrientation,
+    /// Below this the station hears nothing.
+    pub(super) min_elevation_deg: f64,
 }
 
 impl SkyArgs {
     /// Reads what was named. What cannot be used of it is told on standard error.
-    pub(super) fn read(&self) -> Result<Sky, Failure> {
-        let Sky { mut catalogue, places } =
-            if self.elements.is_empty() { self.configured()? } else { self.files()? };
+    pub(super) fn read(&self, window: (UtcInstant, UtcInstant)) -> Result<Sky, Failure> {
+        let Sky { mut catalogue, places, orientation, min_elevation_deg } = match (
+            &self.config,
+            self.elements.is_empty(),
+        ) {
+            (Some(config), true) => self.configured(config, window)?,
+            (None, true) => {
+                return Err(Failure::usage(
+                    "no elements: give --elements FILE (OMM as JSON, CSV, XML or KVN, or TLE), - for standard input, or the \
+                         configuration of a station with --config",
+                ));
+            }
+            (_, false) => self.files()?,
+        };
         for (index, place) in places.iter().enumerate() {
             if places[..index].iter().any(|other| other.name == place.name) {
                 return Err(Failure::usage(format!(
@@ -92,7 +114,7 @@ impl SkyArgs {
         if !self.satellite.is_empty() {
             catalogue.keep(&self.satellite).map_err(Failure::failed)?;
         }
-        Ok(Sky { catalogue, places })
+        Ok(Sky { catalogue, places, orientation, min_elevation_deg })
     }
 
     fn files(&self) -> Result<Sky, Failure> {
@@ -125,13 +147,74 @@ impl SkyArgs {
             }
             catalogue.read(&name, &bytes, checksums).map_err(|error| Failure::doing(name, error))?;
         }
-        Ok(Sky { catalogue, places: self.station.clone() })
+        Ok(Sky {
+            catalogue,
+            places: self.station.clone(),
+            orientation: self.dut1.unwrap_or_default(),
+            min_elevation_deg: 0.0,
+        })
     }
 
-    /// The station of the configuration and the elements of its archive.
-    fn configured(&self) -> Result<Sky, Failure> {
-        Err(Failure::usage("no elements: give --elements FILE (OMM as JSON, CSV, XML or KVN, or TLE), or - for standard input"))
+    /// The station of the configuration and the elements that it holds: from its server where one runs, else from its
+    /// archive. Satellites have the names of the configuration.
+    fn configured(&self, path: &Path, window: (UtcInstant, UtcInstant)) -> Result<Sky, Failure> {
+        let config = Config::load(path).map_err(Failure::usage)?;
+        config.check().map_err(Failure::usage)?;
+        let site = config.station.site().map_err(Failure::usage)?;
+        let places = match (&site, self.station.is_empty()) {
+            (Some(site), true) => {
+                vec![Place { name: config.station.name.clone(), station: site.place.clone() }]
+            }
+            (None, true) => {
+                return Err(Failure::usage(format!(
+                    "{} does not say where the station stands: set station.latitude_deg and station.longitude_deg, or give \
+                     --station LATITUDE,LONGITUDE,HEIGHT_M",
+                    path.display()
+                )));
+            }
+            (_, false) => self.station.clone(),
+        };
+        let objects = runtime()?.block_on(held(&config, window))?;
+        if objects.is_empty() {
+            return Err(Failure::failed(
+                "the station holds no elements: give some with `gs-server elements add`, or name a file with --elements",
+            ));
+        }
+        Ok(Sky {
+            catalogue: Catalogue { objects, ..Catalogue::default() },
+            places,
+            orientation: self.dut1.or(site.as_ref().map(|site| site.orientation)).unwrap_or_default(),
+            min_elevation_deg: site.map_or(0.0, |site| site.min_elevation_deg),
+        })
     }
+}
+
+/// The sets that a station holds for a window of time.
+async fn held(config: &Config, (start, stop): (UtcInstant, UtcInstant)) -> Result<Vec<Object>, Failure> {
+    let station = mission::StationId::new(&config.station.name).map_err(Failure::usage)?;
+    let mut objects = Vec::new();
+    match archive(config, &station).await {
+        Ok(store) => {
+            for satellite in &config.satellites {
+                let window = (start.unix_us(), stop.unix_us());
+                let rows = store.elements_between(&satellite.name, window, SETS_MAX).await;
+                let sets = rows
+                    .and_then(|rows| rows.iter().map(ElementsRow::elements).collect::<Result<Vec<_>, _>>());
+                objects.extend(Object::named(&satellite.name, sets.map_err(Failure::failed)?));
+            }
+            store.close().await.map_err(Failure::failed)?;
+        }
+        Err(RunError::Store(StoreError::Locked { .. })) => {
+            let remote = Remote::new(config).map_err(Failure::failed)?;
+            for satellite in &config.satellites {
+                let held = remote.held(Some(&satellite.name), SETS_MAX).await.map_err(Failure::failed)?;
+                let sets = held.iter().map(|held| elements_of(&held.elements)).collect();
+                objects.extend(Object::named(&satellite.name, sets));
+            }
+        }
+        Err(error) => return Err(Failure::failed(error)),
+    }
+    Ok(objects)
 }
 
 /// Tells lines on standard error, and how many more there are.
@@ -160,7 +243,8 @@ fn frequency(text: &str) -> Result<f64, String> {
 }
 
 fn dut1(text: &str) -> Result<EarthOrientation, String> {
-    let seconds: f64 = text.parse().map_err(|_| format!("'{text}' is no number: give seconds, such as -0.043"))?;
+    let seconds: f64 =
+        text.parse().map_err(|_| format!("'{text}' is no number: give seconds, such as -0.043"))?;
     EarthOrientation::new(seconds).map_err(|error| error.to_string())
 }
 
@@ -240,10 +324,23 @@ mod tests {
         assert_eq!(at("now"), Ok(now));
         assert_eq!(at("2020-07-13T05:19:25.5Z").unwrap().to_string(), "2020-07-13T05:19:25.500000Z");
         assert_eq!(at("2020-07-13").unwrap().to_string(), "2020-07-13T00:00:00.000000Z");
-        for (text, seconds) in [("+7d", 604_800), ("+1w", 604_800), ("+1d12h", 129_600), ("+90m", 5400), ("-2.5h", -9000)] {
+        for (text, seconds) in
+            [("+7d", 604_800), ("+1w", 604_800), ("+1d12h", 129_600), ("+90m", 5400), ("-2.5h", -9000)]
+        {
             assert_eq!(at(text), Ok(now.plus_us(7 + seconds * 1_000_000)), "{text}");
         }
-        for wrong in ["", "+", "+7", "+7y", "7d", "yesterday", "2020-13-01", "2020-07-13T05:19:25+02:00", "+99999d", "+1..5h"] {
+        for wrong in [
+            "",
+            "+",
+            "+7",
+            "+7y",
+            "7d",
+            "yesterday",
+            "2020-13-01",
+            "2020-07-13T05:19:25+02:00",
+            "+99999d",
+            "+1..5h",
+        ] {
             let error = at(wrong).unwrap_err();
             assert!(error.contains("2026-11-22T05:19:25") && error.contains("+7d"), "{wrong}: {error}");
         }

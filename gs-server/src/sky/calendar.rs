@@ -175,7 +175,8 @@ mod tests {
     fn lines_end_in_crlf_and_have_75_octets_at_most() {
         let now = FineTime::from_unix_us(1_594_600_000_000_000);
         let name = "Überflüge, ".repeat(20);
-        let calendar = icalendar(&passes("280.4612", "2020-07-12T21:16:01.000416", "A, B=46.5,6.5,410"), &name, now);
+        let calendar =
+            icalendar(&passes("280.4612", "2020-07-12T21:16:01.000416", "A, B=46.5,6.5,410"), &name, now);
         assert!(calendar.ends_with("END:VCALENDAR\r\n"));
         assert!(!calendar.replace("\r\n", "").contains(['\r', '\n']));
         assert!(calendar.split("\r\n").all(|line| line.len() <= 75));
@@ -184,7 +185,10 @@ mod tests {
         assert!(values(&calendar, "SUMMARY:")[0].starts_with("ISS\\; \"ZARYA\"\\, ÄÖÜ over A\\, B\\, "));
         assert_eq!(values(&calendar, "DTSTAMP:")[0], "20200713T002640Z");
         let description = &values(&calendar, "DESCRIPTION:")[0];
-        assert!(description.contains("Doppler +") && description.contains("\\nTCA 2020-07-13 "), "{description}");
+        assert!(
+            description.contains("Doppler +") && description.contains("\\nTCA 2020-07-13 "),
+            "{description}"
+        );
     }
 
     #[test]

@@ -103,11 +103,8 @@ struct Part<'a> {
 }
 
 fn parts<'a>(object: &'a Object, search: &PassSearch) -> Vec<Part<'a>> {
-    let mut parts = vec![Part {
-        elements: object.set_for(search.start),
-        from: search.start,
-        until: search.stop,
-    }];
+    let mut parts =
+        vec![Part { elements: object.set_for(search.start), from: search.start, until: search.stop }];
     for set in object.sets() {
         let inside = search.start < set.epoch && set.epoch < search.stop;
         let newer = object.set_for(set.epoch);
@@ -231,7 +228,8 @@ mod tests {
         let one = iss();
         let alone = passes(&one);
         assert!(alone.len() > 8);
-        for (pass, offset_s) in alone.iter().flat_map(|pass| [-1.0, 1.0, 100.0].map(|offset| (pass, offset))) {
+        for (pass, offset_s) in alone.iter().flat_map(|pass| [-1.0, 1.0, 100.0].map(|offset| (pass, offset)))
+        {
             // The same orbit, told at an epoch within the pass: what SGP4 says there, as mean elements a revolution later,
             // differs; so the same set is told again with another number, at its own epoch moved by nothing but the label.
             let mut newer = one.sets()[0].clone();
@@ -245,7 +243,8 @@ mod tests {
             catalogue.read("newer", text.as_bytes(), Checksums::Strict).unwrap();
             assert_eq!(catalogue.objects.len(), 1);
             let both = passes(&catalogue.objects[0]);
-            let near: Vec<_> = both.iter().filter(|other| other.aos < pass.los && pass.aos < other.los).collect();
+            let near: Vec<_> =
+                both.iter().filter(|other| other.aos < pass.los && pass.aos < other.los).collect();
             assert_eq!(near.len(), 1, "{offset_s}: {near:#?}");
             assert!(!near[0].aos_clipped && !near[0].los_clipped);
             assert!(both.windows(2).all(|pair| pair[0].los <= pair[1].aos));
@@ -283,8 +282,7 @@ mod tests {
         let start: UtcInstant = "2020-07-13T00:00:00Z".parse().unwrap();
         let search = PassSearch::new(start, start.plus_seconds(86_400.0), 0.0);
         let objects = vec![iss(); 64];
-        let error =
-            predict(&objects, &[lausanne()], &search, None, |_| ControlFlow::Break(())).unwrap_err();
+        let error = predict(&objects, &[lausanne()], &search, None, |_| ControlFlow::Break(())).unwrap_err();
         assert!(matches!(error, PredictError::Search(SearchError::Stopped { total: 64, .. })), "{error}");
     }
 }

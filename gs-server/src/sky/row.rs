@@ -151,3 +151,28 @@ pub fn elements_view(elements: &Elements) -> ElementsView {
         rev_at_epoch: elements.rev_at_epoch,
     }
 }
+
+/// A set of elements from the wire, as far as SGP4 needs it.
+#[must_use]
+pub fn elements_of(view: &ElementsView) -> Elements {
+    Elements {
+        name: Some(view.satellite.clone()),
+        object_id: view.object_id.clone(),
+        norad_cat_id: view.norad_cat_id,
+        epoch: instant(view.epoch),
+        mean_motion_rev_day: view.mean_motion_rev_day,
+        eccentricity: view.eccentricity,
+        inclination_deg: view.inclination_deg,
+        raan_deg: view.raan_deg,
+        arg_of_perigee_deg: view.arg_of_perigee_deg,
+        mean_anomaly_deg: view.mean_anomaly_deg,
+        bstar: view.bstar,
+        mean_motion_dot: 0.0,
+        mean_motion_ddot: 0.0,
+        ephemeris_type: None,
+        classification: None,
+        element_set_no: view.element_set_no,
+        rev_at_epoch: view.rev_at_epoch,
+        further: Vec::new(),
+    }
+}

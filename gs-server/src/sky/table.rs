@@ -84,8 +84,9 @@ pub fn look_table(looks: &[LookView]) -> String {
         .to_vec(),
     ];
     for look in looks {
-        let number =
-            |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+        let number = |value: Option<f64>, digits: usize| {
+            value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+        };
         let below = match (look.latitude_deg, look.longitude_deg) {
             (Some(latitude), Some(longitude)) => format!("{latitude:.3},{longitude:.3}"),
             _ => "-".to_owned(),
