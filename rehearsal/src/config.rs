@@ -22,7 +22,8 @@ pub struct WorldConfig {
     pub ranges: bool,
     /// Answers carry tags.
     pub tags: bool,
-    /// Ground is told when the satellite comes into view, and when it will be lost.
+    /// Ground is told when the satellite comes into view, and when it will be lost; where an orbit decides that, ground is
+    /// given the elements and the station's place instead, and finds out by itself.
     pub view_is_known: bool,
     /// What people do.
     pub operator: Operator,

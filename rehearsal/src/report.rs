@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use satellite::CarriedAt;
+
 /// Counts of one run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Report {
@@ -13,6 +15,9 @@ pub struct Report {
     pub frames_sent: u64,
     /// Frames that ground stored.
     pub frames_heard: u64,
+    /// Frames while the satellite was in view, both ways, and how many of them the air lost, for each ten degrees of
+    /// elevation.
+    pub by_elevation: [CarriedAt; 9],
     /// Requests for chunks, chunks asked for, chunks bridged.
     pub requests: u64,
     /// Chunks asked for in all requests.

@@ -10,7 +10,9 @@ use mission::snapshot::{
     CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot, Snapshot,
     Witness,
 };
-use mission::{Batch, CommandId, DownloadId, ElementSet, FrameId, ImageId, PassId, SatelliteId, Stage, UtcUs};
+use mission::{
+    Batch, CommandId, DownloadId, ElementSet, FrameId, ImageId, PassId, SatelliteId, Stage, UtcUs,
+};
 use protocol::{Counter, Downlink, KeyId, RequestTag};
 
 /// A command with its last stage.

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use mission::{
-    Accepted, Batch, BatchId, CounterRule, Effect, Entropy, Input, LinkConfig, LinkId, LinkState,
-    MaybeRadiated, MonoUs, Now, Profile, SatelliteConfig, SatelliteId, Source, Station, StationConfig,
-    StationId, Transmit, TxId, UtcUs,
+    Accepted, Batch, BatchId, CounterRule, Effect, Entropy, Input, Intent, IntentEnvelope, IntentId,
+    LinkConfig, LinkId, LinkState, MaybeRadiated, MonoUs, Now, Principal, Profile, SatelliteConfig,
+    SatelliteId, Site, Source, Station, StationConfig, StationId, Transmit, TxId, UtcUs,
 };
 use protocol::{Counter, Key, KeyId};
 use radio::airtime::{LinkTiming, uart_us};
@@ -15,7 +15,9 @@ use radio::driver::{
 use radio::model::ModelConfig;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use satellite::{Camera, Device, DeviceConfig, DeviceOutput, ImageSource, JournalEntry, TwinConfig};
+use satellite::{
+    Camera, Device, DeviceConfig, DeviceOutput, ImageSource, JournalEntry, PassProfile, TwinConfig,
+};
 use sha2::{Digest, Sha256};
 
 use crate::checks::{Air, Invariant, Violation};
@@ -168,6 +170,7 @@ impl World {
             simulated_s: self.now_us as f64 / 1e6,
             frames_sent: stats.twin.frames,
             frames_heard: self.store.frames,
+            by_elevation: stats.channel.by_elevation,
             requests,
             chunks_requested,
             chunks_bridged,
@@ -306,7 +309,21 @@ impl World {
         }
     }
 
+    /// Where the station stands, where that decides the passes and ground may know them.
+    fn site(&self) -> Option<Site> {
+        let PassProfile::Orbit { station, orientation } = &self.config.channel.passes else { return None };
+        self.config.view_is_known.then(|| Site {
+            place: (**station).clone(),
+            min_elevation_deg: station.mask().range_deg().0,
+            orientation: *orientation,
+        })
+    }
+
+    /// The satellite comes or goes. Under a stored profile ground is told; with elements it knows.
     fn tell_view(&mut self) {
+        if self.site().is_some() {
+            return;
+        }
         let los = self.device.next_view_change_us(self.now_us).and_then(|at| i64::try_from(at).ok());
         let los = los.map(|at| UtcUs(self.utc_at_zero_us + at));
         let satellite = self.satellite.clone();
@@ -381,12 +398,30 @@ impl World {
         self.driver.handle(self.now_us, DriverInput::Opened);
         self.tell(Input::Clock { synchronised: true });
         if self.config.view_is_known {
+            self.tell_elements();
             self.tell_view();
         }
         self.driver_out();
         if self.lives == 1 {
             self.plan_chaos();
         }
+    }
+
+    /// Ground is given the elements that the satellite flies. What it holds already it skips.
+    fn tell_elements(&mut self) {
+        if self.site().is_none() {
+            return;
+        }
+        let elements = vec![self.device.twin().orbit().elements().clone()];
+        let (satellite, source) = (self.satellite.clone(), "the rehearsal".to_owned());
+        let number = u64::MAX - self.lives;
+        self.tell(Input::Intent(IntentEnvelope {
+            id: IntentId(number),
+            principal: Principal::new("rehearsal"),
+            idempotency_key: number.to_string(),
+            digest: [0; 32],
+            intent: Intent::AddElements { satellite, elements, source },
+        }));
     }
 
     /// kill -9: what was not committed is gone, what the radio has is radiated.
@@ -568,7 +603,7 @@ impl World {
     fn station_config(&self) -> StationConfig {
         StationConfig {
             station: station_name(),
-            site: None,
+            site: self.site(),
             satellites: vec![SatelliteConfig {
                 id: self.satellite.clone(),
                 profile: Profile {

@@ -133,6 +133,18 @@ pub struct ChannelStats {
     pub cut: u64,
     /// Runs of junk made of noise.
     pub noise: u64,
+    /// Frames while the satellite was in view, both ways, by the elevation: one count for each ten degrees, what
+    /// stands below 0 (a mask may allow it) in the first.
+    pub by_elevation: [CarriedAt; 9],
+}
+
+/// Frames at some elevation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CarriedAt {
+    /// Sent.
+    pub sent: u64,
+    /// Of these lost for weakness, in bursts or at random.
+    pub lost: u64,
 }
 
 /// The seeded channel.
@@ -215,7 +227,17 @@ impl Channel {
             self.stats.out_of_view += 1;
             return Err(LossCause::OutOfView);
         }
-        let power_dbm = mean_rssi_dbm(&self.sky.look(now_us)) + self.rng.random_range(-FADING_DB..=FADING_DB);
+        let look = self.sky.look(now_us);
+        let band = ((look.elevation_deg.max(0.0) / 10.0) as usize).min(8);
+        self.stats.by_elevation[band].sent += 1;
+        let carried = self.fade(mean_rssi_dbm(&look), packet);
+        self.stats.by_elevation[band].lost += u64::from(carried.is_err());
+        carried
+    }
+
+    /// What becomes of a frame of this mean strength.
+    fn fade(&mut self, mean_dbm: f64, packet: &[u8]) -> Result<(Vec<u8>, i16), LossCause> {
+        let power_dbm = mean_dbm + self.rng.random_range(-FADING_DB..=FADING_DB);
         if self.config.elevation_loss && self.chance(weak_loss(power_dbm)) {
             return Err(LossCause::Weak);
         }

@@ -52,7 +52,7 @@ mod twin;
 mod vector;
 
 pub use channel::{
-    Burst, Channel, ChannelConfig, ChannelStats, LossCause, Reception, Transit, mean_rssi_dbm,
+    Burst, CarriedAt, Channel, ChannelConfig, ChannelStats, LossCause, Reception, Transit, mean_rssi_dbm,
 };
 pub use config::{Camera, Fault, ImageSource, ReplayPolicy, TwinConfig};
 pub use device::{DOPPLER_TOLERANCE_HZ, Device, DeviceConfig, DeviceOutput, DeviceStats};

@@ -206,6 +206,9 @@ fn losses(orbit: &Orbit) -> ([(u32, u32); 9], ChannelStats) {
 #[test]
 fn frames_are_lost_below_the_horizon_and_low_in_the_sky() {
     let (bands, stats) = losses(&Orbit::fictional(4, ZERO));
+    // The frames of the satellite, and one of ground's for each pass, which is below the horizon.
+    let counted = stats.by_elevation.map(|band| (band.sent as u32, band.lost as u32));
+    assert_eq!(counted, bands);
     let share = |band: usize| f64::from(bands[band].1) / f64::from(bands[band].0);
     println!("sent and lost by tens of degrees: {bands:?}");
     assert!(bands.iter().all(|(sent, _)| *sent > 100), "{bands:?}");
