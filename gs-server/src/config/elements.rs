@@ -105,7 +105,8 @@ impl FetchSource {
         let host = url.host_str().unwrap_or_default();
         match url.scheme() {
             "https" => {}
-            "http" if is_loopback(&url) || (self.credentials_file.is_none() && !host.contains("celestrak")) => {}
+            "http"
+                if is_loopback(&url) || (self.credentials_file.is_none() && !host.contains("celestrak")) => {}
             "http" => {
                 return Err((
                     format!("'{host}' is asked without encryption"),
@@ -138,7 +139,11 @@ impl Config {
         let section = &self.elements;
         let fail = |key: String, problem: String, remedy: &str| Err(ConfigError::value(key, problem, remedy));
         if section.fetch.len() > MOST {
-            return fail("elements.fetch".into(), format!("there are {}", section.fetch.len()), "16 fit; fetch groups.");
+            return fail(
+                "elements.fetch".into(),
+                format!("there are {}", section.fetch.len()),
+                "16 fit; fetch groups.",
+            );
         }
         for (at, source) in section.fetch.iter().enumerate() {
             let key = format!("elements.fetch[{at}]");
@@ -147,7 +152,11 @@ impl Config {
                 Err((problem, remedy)) => return fail(key, problem, remedy),
             };
             if section.fetch[..at].iter().any(|earlier| earlier.url == source.url) {
-                return fail(key, "the same address stands there twice".into(), "Remove one: a source is asked once.");
+                return fail(
+                    key,
+                    "the same address stands there twice".into(),
+                    "Remove one: a source is asked once.",
+                );
             }
             if self.simulation.is_some() && !is_loopback(&url) {
                 return fail(

@@ -79,8 +79,7 @@ async fn try_ask(source: &FetchSource, url: &Url, patience: Duration) -> Result<
     let client = http_client(url, patience).map_err(Answer::Unreached)?;
     let mut headers = HeaderMap::new();
     if let Some(file) = &source.credentials_file {
-        let credentials =
-            Credentials::load(file).map_err(|error| Answer::Unreached(error.to_string()))?;
+        let credentials = Credentials::load(file).map_err(|error| Answer::Unreached(error.to_string()))?;
         headers.insert(COOKIE, log_in(&client, url, credentials).await?);
     }
     let response = client.get(url.clone()).headers(headers).send().await.map_err(|error| lost(&error))?;

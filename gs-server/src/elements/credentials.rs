@@ -49,7 +49,8 @@ impl Credentials {
             .open(path)
             .map_err(failed)?;
         let about = file.metadata().map_err(failed)?;
-        if !about.is_file() || about.mode() & 0o077 != 0 || about.uid() != rustix::process::geteuid().as_raw() {
+        if !about.is_file() || about.mode() & 0o077 != 0 || about.uid() != rustix::process::geteuid().as_raw()
+        {
             return Err(CredentialsError::Exposed(path.to_owned()));
         }
         // Room for all of it: a string that grows leaves copies behind.

@@ -55,7 +55,11 @@ impl Adder {
             hash.update(format!("{set:?}"));
         }
         let digest: [u8; 32] = hash.finalize().into();
-        Self { principal: Principal::new(principal), key: format!("elements-{}", hex::encode(digest)), digest }
+        Self {
+            principal: Principal::new(principal),
+            key: format!("elements-{}", hex::encode(digest)),
+            digest,
+        }
     }
 }
 
@@ -72,9 +76,13 @@ impl Door {
         source: &str,
         adder: &Adder,
     ) -> Result<(ElementsAdded, bool), AddError> {
+        // What was added then is held now, so the engine would not be asked and could not tell.
+        let mut replayed = match self.store.find_intent(&adder.principal, &adder.key).await? {
+            Some(stored) if stored.digest != adder.digest => return Err(IntentError::KeyReused.into()),
+            earlier => earlier.is_some(),
+        };
         let fresh = self.fresh(satellite, sets).await?;
         let added = fresh.len() as u64;
-        let mut replayed = false;
         for (at, chunk) in fresh.chunks(SETS_AT_ONCE).enumerate() {
             let key = if at == 0 { adder.key.clone() } else { format!("{}#{at}", adder.key) };
             let intent = Intent::AddElements {
@@ -82,13 +90,18 @@ impl Door {
                 elements: chunk.to_vec(),
                 source: source.to_owned(),
             };
-            replayed |= self.engine.intent(adder.principal.clone(), key, adder.digest, intent).await?.replayed;
+            replayed |=
+                self.engine.intent(adder.principal.clone(), key, adder.digest, intent).await?.replayed;
         }
         let report = ElementsAdded {
             satellite: satellite.to_string(),
             added,
             held: sets.len() as u64 - added,
-            newest_epoch: sets.iter().map(|set| set.epoch).max().map(|at| FineTime::from_unix_us(at.unix_us())),
+            newest_epoch: sets
+                .iter()
+                .map(|set| set.epoch)
+                .max()
+                .map(|at| FineTime::from_unix_us(at.unix_us())),
             of_others: 0,
             refused: Vec::new(),
             warnings: Vec::new(),

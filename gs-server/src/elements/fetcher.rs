@@ -95,7 +95,9 @@ impl Fetcher {
                             );
                         }
                     }
-                    Err(why) => tracing::warn!("the last download of {} cannot be taken up: {why}", source.url),
+                    Err(why) => {
+                        tracing::warn!("the last download of {} cannot be taken up: {why}", source.url)
+                    }
                 },
                 Ok(Ok(None)) => {}
                 Ok(Err(why)) | Err(why) => {
@@ -193,7 +195,8 @@ impl Fetcher {
             Answer::Body(body) => match self.take(&source.url, body).await {
                 Ok(read) => {
                     let (sets, refused) = (read.sets.len(), read.refused.len());
-                    let broken = if refused > 0 { format!(", {refused} broken ones left out") } else { String::new() };
+                    let broken =
+                        if refused > 0 { format!(", {refused} broken ones left out") } else { String::new() };
                     let detail = format!("{sets} sets ({}){broken}", read.form.name());
                     text = Some(read);
                     detail

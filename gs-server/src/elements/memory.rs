@@ -88,7 +88,11 @@ impl Memory {
             }
             other => {
                 let why = other.map_or_else(|error| error, |_| "it is of another address".to_owned());
-                tracing::warn!(url, "what {} says of {url} is lost ({why}): it counts as asked now", path.display());
+                tracing::warn!(
+                    url,
+                    "what {} says of {url} is lost ({why}): it counts as asked now",
+                    path.display()
+                );
                 let state = State { url: url.to_owned(), asked_at_us: Some(now.0), ..State::default() };
                 self.keep(&state);
                 state
@@ -122,7 +126,8 @@ impl Memory {
 
     fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
         let temporary = PathBuf::from(format!("{}.new", path.display()));
-        let mut file = OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&temporary)?;
+        let mut file =
+            OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&temporary)?;
         file.write_all(bytes)?;
         file.sync_all()?;
         std::fs::rename(&temporary, path)?;

@@ -25,7 +25,9 @@ const ANSWER_MAX: usize = 16 << 20;
 #[derive(Debug, thiserror::Error)]
 pub enum RemoteError {
     /// The configuration does not say where it listens.
-    #[error("the server listens on a port that it chose itself (http.listen with port 0): give the port in the configuration")]
+    #[error(
+        "the server listens on a port that it chose itself (http.listen with port 0): give the port in the configuration"
+    )]
     NoPort,
     /// No client.
     #[error("no request can be made: {0}")]
@@ -176,7 +178,8 @@ impl Remote {
     }
 
     async fn send<T: DeserializeOwned>(&self, request: RequestBuilder, url: &Url) -> Result<T, RemoteError> {
-        let no_answer = |error: reqwest::Error| RemoteError::NoAnswer { url: url.to_string(), why: chain(&error) };
+        let no_answer =
+            |error: reqwest::Error| RemoteError::NoAnswer { url: url.to_string(), why: chain(&error) };
         let strange = |why: String| RemoteError::Strange { url: url.to_string(), why };
         let mut response = request.send().await.map_err(no_answer)?;
         let status = response.status();

@@ -80,7 +80,11 @@ pub(crate) struct ElementsTask {
 }
 
 impl ElementsTask {
-    pub(crate) fn new(fetcher: Fetcher, wanted: Vec<Wanted>, timer: Arc<dyn Timer>) -> (Self, ElementsHandle) {
+    pub(crate) fn new(
+        fetcher: Fetcher,
+        wanted: Vec<Wanted>,
+        timer: Arc<dyn Timer>,
+    ) -> (Self, ElementsHandle) {
         let (requests, inbox) = mpsc::channel(INBOX);
         let (sources, shown) = watch::channel(Arc::new(fetcher.sources()));
         let handle = ElementsHandle {

@@ -23,10 +23,14 @@ pub(super) async fn list(
     State(app): State<App>,
     Query(query): Query<ListQuery>,
 ) -> Result<Json<Page<HeldElements>>, Failure> {
-    let page = query.page()?;
+    let (scope, page) = (query.scope(), query.page()?);
+    if scope.link.is_some() {
+        let message = "elements are of a satellite, not of a link: ask by satellite or station";
+        return Err(Failure::field(ProblemKind::BadParameter, "link", message));
+    }
     let state = &app.state;
     let now = state.timer.now().utc;
-    let items = held(&state.store, state.elements.wanted(), &query.scope(), &page, now).await?;
+    let items = held(&state.store, state.elements.wanted(), &scope, &page, now).await?;
     Ok(Json(paged(items, &page, |held| held.id)))
 }
 
@@ -35,17 +39,15 @@ pub(super) async fn sources(State(app): State<App>) -> Json<Page<ElementsSource>
 }
 
 /// Sets of one satellite; those of other objects in the same text are passed over.
-pub(super) async fn add(
-    State(app): State<App>,
-    write: Write<ElementsRequest>,
-) -> Result<Response, Failure> {
+pub(super) async fn add(State(app): State<App>, write: Write<ElementsRequest>) -> Result<Response, Failure> {
     let ElementsRequest { satellite: named, text, source, lenient } = &write.body;
     let id = satellite(&app, named.as_deref())?;
     let checksums = if *lenient { Checksums::Lenient } else { Checksums::Strict };
     let bad = |why: String| Failure::field(ProblemKind::BadArgument, TEXT, why);
     let read = SetsOfText::read(text.as_bytes(), checksums).map_err(|error| bad(error.to_string()))?;
     let wanted = app.state.elements.wanted().iter().find(|wanted| wanted.satellite == id);
-    let wanted = wanted.ok_or_else(|| Failure::new(ProblemKind::Internal, "The satellite has no section."))?;
+    let wanted =
+        wanted.ok_or_else(|| Failure::new(ProblemKind::Internal, "The satellite has no section."))?;
     let sets = sets_of(wanted, &read.sets, true).map_err(|why| bad(no_match(&why, &read)))?;
     let source = source.as_deref().unwrap_or("API");
     let (principal, key, digest) = write.who();

@@ -65,7 +65,6 @@ impl Add {
     }
 }
 
-
 /// Gives each satellite its sets.
 pub(super) async fn add(
     config: &Config,
@@ -112,7 +111,8 @@ pub(super) async fn add(
     match Station::of(config).await? {
         Station::Running(remote) => {
             for (wanted, sets) in matched {
-                let added = remote.add(wanted.satellite.as_str(), &sets, source).await.map_err(remote_failure)?;
+                let added =
+                    remote.add(wanted.satellite.as_str(), &sets, source).await.map_err(remote_failure)?;
                 satellites.push(report(added, text, sets.len(), source));
             }
         }

@@ -70,7 +70,9 @@ async fn fetch(config: &Config) -> Result<FetchReport, Failure> {
         Station::Stopped(offline) => {
             let timer = std::sync::Arc::clone(&offline.timer);
             let fetcher = Fetcher::new(config, offline.door.store.folder(), offline.door.clone(), timer)
-                .map_err(|error| Failure::doing("the folder 'elements' in the data folder cannot be made", error))?;
+                .map_err(|error| {
+                    Failure::doing("the folder 'elements' in the data folder cannot be made", error)
+                })?;
             let mut awake = offline.timer.busy("fetch of elements");
             fetcher.take_up().await;
             let report = fetcher.round(Asker::Operator, &mut awake).await;

@@ -93,7 +93,10 @@ impl List {
             Err(RunError::Store(StoreError::Locked { .. })) => {
                 let remote = running(config)?;
                 return Ok(Listed {
-                    elements: remote.held(self.satellite.as_deref(), self.limit).await.map_err(remote_failure)?,
+                    elements: remote
+                        .held(self.satellite.as_deref(), self.limit)
+                        .await
+                        .map_err(remote_failure)?,
                     sources: remote.sources().await.map_err(remote_failure)?,
                 });
             }

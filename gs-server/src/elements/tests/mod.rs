@@ -54,7 +54,7 @@ async fn elements_are_fetched_at_start_reach_the_status_and_are_not_asked_for_ag
     bench.advance(HOUR_US - 60_000_000).await;
     assert_eq!(bench.fetch().await.sources[0].outcome, FetchWord::TooEarly);
     bench.advance(120_000_000).await;
-    source.now_says(|_| Some(say(200, &group(195.5))));
+    source.now_says(|_| Some(say(200, &group(196.5))));
     assert_eq!(bench.fetch().await.sources[0].outcome, FetchWord::Downloaded);
     bench.until_epoch(194.5).await;
     assert_eq!(source.count(), 2);
@@ -63,7 +63,7 @@ async fn elements_are_fetched_at_start_reach_the_status_and_are_not_asked_for_ag
     bench.advance(2 * HOUR_US).await;
     assert_eq!(source.count(), 3);
     bench.advance(24 * HOUR_US).await;
-    bench.until_epoch(195.5).await;
+    bench.until_epoch(196.5).await;
     assert!((6..=7).contains(&source.count()), "{} requests in a day and a half", source.count());
     let held = bench.ask("GET", "elements", "").await;
     let held: api::Page<api::HeldElements> = serde_json::from_str(&held).unwrap();
@@ -97,13 +97,19 @@ async fn not_updated_since_is_one_request_and_the_cache_stays() {
 #[tokio::test(flavor = "multi_thread")]
 async fn any_other_answer_stops_it_until_an_operator_says_so_across_restarts() {
     let elsewhere = Source::saying(200, &group(194.5)).await;
-    for (status, says) in [(301, "has moved"), (302, "has moved"), (403, "403"), (404, "404"), (500, "500"), (204, "204")] {
+    for (status, says) in
+        [(301, "has moved"), (302, "has moved"), (403, "403"), (404, "404"), (500, "500"), (204, "204")]
+    {
         let target = elsewhere.url();
         let script = {
             let target = target.clone();
             move |_: &source::Asked| {
                 let headers = [("location", target.as_str())];
-                Some(say_with(status, if status < 400 && status >= 300 { &headers } else { &[] }, "nope, sorry"))
+                Some(say_with(
+                    status,
+                    if status < 400 && status >= 300 { &headers } else { &[] },
+                    "nope, sorry",
+                ))
             }
         };
         let source = Source::new(script).await;
@@ -139,7 +145,15 @@ async fn any_other_answer_stops_it_until_an_operator_says_so_across_restarts() {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_no_elements_is_a_failed_download_and_the_old_ones_stay() {
     let broken = group(195.0).replace("\"MEAN_MOTION\":15.49507896", "\"MEAN_MOTION\":-1");
-    for body in ["<!DOCTYPE html><html><title>Maintenance</title>", "No GP data found", "", " \n", "[]", "{\"error\":1}", &broken] {
+    for body in [
+        "<!DOCTYPE html><html><title>Maintenance</title>",
+        "No GP data found",
+        "",
+        " \n",
+        "[]",
+        "{\"error\":1}",
+        &broken,
+    ] {
         let source = Source::saying(200, &group(194.5)).await;
         let home = Home::new(&quoted(&source));
         let mut bench = home.serve(START).await;
@@ -177,7 +191,10 @@ async fn a_kill_between_download_and_adding_loses_nothing_and_asks_nobody() {
     let mut bench = home.serve(UtcUs(START.0 + 1)).await;
     bench.until_epoch(194.5).await;
     let held = bench.ask("GET", "elements", "").await;
-    assert_eq!(serde_json::from_str::<serde_json::Value>(&held).unwrap()["items"].as_array().unwrap().len(), 1);
+    assert_eq!(
+        serde_json::from_str::<serde_json::Value>(&held).unwrap()["items"].as_array().unwrap().len(),
+        1
+    );
     bench.end().await;
 }
 

@@ -1,8 +1,10 @@
 //! A real store in a temporary folder and a real engine, heard by a satellite made of bytes.
 
+mod elements;
 mod page;
 mod reads;
 mod security;
+mod sky;
 mod stream;
 mod writes;
 
@@ -51,20 +53,23 @@ impl Drop for Bench {
 
 impl Bench {
     async fn new() -> Self {
-        Self::listening("127.0.0.1:8700".parse().unwrap()).await
+        Self::of(station()).await
     }
 
-    async fn listening(address: std::net::SocketAddr) -> Self {
+    async fn of(station: StationConfig) -> Self {
+        Self::listening(station, "127.0.0.1:8700".parse().unwrap()).await
+    }
+
+    async fn listening(station: StationConfig, address: std::net::SocketAddr) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(StoreOptions {
             folder: folder.path().join("data"),
-            station: Some(station().station),
+            station: Some(station.station.clone()),
             simulated: true,
             max_page_count: None,
             reserve_bytes: 1 << 16,
         });
         let store = store.await.unwrap();
-        let station = station();
         let timer: Arc<dyn Timer> = Arc::new(SystemClock::new());
         let hub = Hub::new();
         let satellites: Vec<SatelliteId> = station.satellites.iter().map(|s| s.id.clone()).collect();
@@ -162,7 +167,7 @@ impl Bench {
     async fn on_a_socket() -> (Self, std::net::SocketAddr) {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
-        let bench = Self::listening(address).await;
+        let bench = Self::listening(station(), address).await;
         tokio::spawn(serve(listener, bench.router.clone(), bench.stop.clone()));
         (bench, address)
     }
