@@ -4,7 +4,7 @@ use api::PassView;
 use tle::propagator::{ElementsError, PropagationError};
 use tle::{EarthOrientation, Elements, HorizonMask, Propagator, UtcInstant};
 
-use super::svg::{Anchor, Canvas, Part, Px, svg_part, token};
+use super::svg::{Anchor, Canvas, Part, Px, svg, token};
 use super::table::{clock, day};
 use super::track::TrackPoint;
 use super::{Place, SkyTrack, instant};
@@ -49,12 +49,12 @@ fn draw(plot: &SkyPlot<'_>, here: Option<&TrackPoint>, form: PlotForm) -> String
         track.tca.elevation_deg
     );
     let part = match form {
-        PlotForm::Full => Part { size_px: SIZE_PX, corner_px: (0, 0), part_px: SIZE_PX, text_scale: 1.0 },
+        PlotForm::Full => Part::whole(SIZE_PX),
         PlotForm::Compact => {
             Part { size_px: SIZE_PX, corner_px: (18, 52), part_px: (564, 564), text_scale: 1.8 }
         }
     };
-    svg_part(&part, &title, |canvas| {
+    svg(&part, &title, |canvas| {
         if form == PlotForm::Full {
             canvas.text(plot.satellite, (24.0, 26.0), Anchor::Left, 18.0, token("text"));
             let under = format!("over {}", plot.station);
@@ -225,7 +225,8 @@ fn path(canvas: &Canvas<'_>, track: &SkyTrack, form: PlotForm) {
             token("text"),
             1.0,
         );
-        let near_mark = [&track.aos, &track.tca, &track.los].iter().any(|mark| distance(of(mark), at) < 34.0 * room);
+        let near_mark =
+            [&track.aos, &track.tca, &track.los].iter().any(|mark| distance(of(mark), at) < 34.0 * room);
         if index % every == every / 2 && !near_mark {
             // On the side away from the zenith, where there is room.
             let outwards =

@@ -51,12 +51,7 @@ pub(super) struct Canvas<'a> {
     text_scale: f64,
 }
 
-/// Draws a picture of so many pixels on the console's ground. `title` is read aloud and shown where a pointer rests.
-pub(super) fn svg(size_px: (u32, u32), title: &str, draw: impl FnOnce(&Canvas<'_>)) -> String {
-    svg_part(&Part { size_px, corner_px: (0, 0), part_px: size_px, text_scale: 1.0 }, title, draw)
-}
-
-/// A part of a picture, to be shown small: with texts that are larger for it.
+/// What shows of a picture; of one that is shown small, a part with larger texts.
 pub(super) struct Part {
     /// The whole picture.
     pub(super) size_px: (u32, u32),
@@ -68,8 +63,15 @@ pub(super) struct Part {
     pub(super) text_scale: f64,
 }
 
-/// [`svg`] of which only a part shows.
-pub(super) fn svg_part(part: &Part, title: &str, draw: impl FnOnce(&Canvas<'_>)) -> String {
+impl Part {
+    /// All of a picture of so many pixels.
+    pub(super) fn whole(size_px: (u32, u32)) -> Self {
+        Self { size_px, corner_px: (0, 0), part_px: size_px, text_scale: 1.0 }
+    }
+}
+
+/// Draws a picture on the console's ground. `title` is read aloud and shown where a pointer rests.
+pub(super) fn svg(part: &Part, title: &str, draw: impl FnOnce(&Canvas<'_>)) -> String {
     let units = |px: u32| px.saturating_mul(UNITS_PER_PX as u32);
     let (width, height) = (units(part.size_px.0), units(part.size_px.1));
     let mut text = String::new();
@@ -149,8 +151,11 @@ impl Canvas<'_> {
 
     /// Text whose middle line lies at `at`.
     pub(super) fn text(&self, text: &str, at: Px, anchor: Anchor, size_px: f64, colour: RGBAColor) {
-        let font =
-            FontDesc::new(FontFamily::SansSerif, size_px * self.text_scale * UNITS_PER_PX * FONT_FACTOR, FontStyle::Normal);
+        let font = FontDesc::new(
+            FontFamily::SansSerif,
+            size_px * self.text_scale * UNITS_PER_PX * FONT_FACTOR,
+            FontStyle::Normal,
+        );
         let across = match anchor {
             Anchor::Left => HPos::Left,
             Anchor::Middle => HPos::Center,
@@ -180,7 +185,7 @@ mod tests {
     #[test]
     fn names_from_strangers_stay_text() {
         let evil = "<script>alert(1)</script>\u{0}&\"";
-        let drawn = svg((100, 50), evil, |canvas| {
+        let drawn = svg(&Part::whole((100, 50)), evil, |canvas| {
             canvas.text(evil, (1.0, 2.0), Anchor::Left, 12.0, token("text"));
         });
         assert!(!drawn.contains("<script") && !drawn.contains('\u{0}'), "{drawn}");

@@ -4,9 +4,9 @@ use api::PassView;
 use plotters::style::Color as _;
 use tle::UtcInstant;
 
-use super::instant;
-use super::svg::{Anchor, Canvas, Px, svg, token};
+use super::svg::{Anchor, Canvas, Part, Px, svg, token};
 use super::table::{clock, day};
+use super::{PlotForm, instant};
 
 const WIDTH_PX: u32 = 1080;
 /// Narrower than this, names stand above their lanes and not beside them.
@@ -59,8 +59,7 @@ impl<'a> Sheet<'a> {
 
     fn x_of(&self, at: UtcInstant) -> f64 {
         let whole = self.timeline.stop.seconds_since(self.timeline.start).max(1e-6);
-        self.left
-            + (self.right - self.left) * (at.seconds_since(self.timeline.start) / whole).clamp(0.0, 1.0)
+        self.left + (self.right - self.left) * (at.seconds_since(self.timeline.start) / whole).clamp(0.0, 1.0)
     }
 }
 
@@ -75,12 +74,12 @@ struct Lane<'a> {
 /// Draws a bar for each pass, as high as the pass is (full height: the zenith), a lane for each station and satellite.
 #[must_use]
 pub fn timeline_svg(timeline: &Timeline<'_>) -> String {
-    timeline_svg_of_width(timeline, WIDTH_PX)
+    timeline_svg_of_width(timeline, WIDTH_PX, PlotForm::Full)
 }
 
-/// [`timeline_svg`] for a page or screen of this width; the least is 280.
+/// [`timeline_svg`] for a page or screen of this width, the least being 280, and in a compact form without its heading.
 #[must_use]
-pub fn timeline_svg_of_width(timeline: &Timeline<'_>, width_px: u32) -> String {
+pub fn timeline_svg_of_width(timeline: &Timeline<'_>, width_px: u32, form: PlotForm) -> String {
     let width_px = width_px.clamp(280, 4000);
     let sheet = Sheet::new(timeline, width_px);
     let lanes = lanes(timeline.passes);
@@ -95,7 +94,16 @@ pub fn timeline_svg_of_width(timeline: &Timeline<'_>, width_px: u32) -> String {
         day(timeline.stop),
         clock(timeline.stop)
     );
-    svg((width_px, height.ceil() as u32), &title, |canvas| {
+    let size_px = (width_px, height.ceil() as u32);
+    let part = match form {
+        PlotForm::Full => Part::whole(size_px),
+        PlotForm::Compact => {
+            let (above, below) = (34, 20);
+            let part_px = (width_px, size_px.1 - above - below);
+            Part { size_px, corner_px: (0, above), part_px, text_scale: 1.0 }
+        }
+    };
+    svg(&part, &title, |canvas| {
         canvas.text("Passes", (24.0, 26.0), Anchor::Left, 18.0, token("text"));
         if !sheet.is_narrow {
             let words = "height of a bar: greatest elevation, 90° is the whole lane";

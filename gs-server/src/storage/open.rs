@@ -216,7 +216,7 @@ async fn check_schema(connection: &mut SqliteConnection, options: &StoreOptions)
     Ok(())
 }
 
-async fn schema_crc(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
+pub(super) async fn schema_crc(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
     let texts: Vec<String> = sqlx::query_scalar(
         "select sql from sqlite_schema where sql is not null and name not like 'sqlite~_%' escape '~'
          order by type, name",

@@ -187,8 +187,8 @@ impl Station {
         if added > 0 {
             self.satellites[s].sky.trim();
             self.audit(now.utc, who, "elements.add", format!("{satellite}: {added} from {source}"));
-            let sets = if added == 1 { "a set" } else { "sets" };
-            let message = format!("{who} added {added} {sets} of elements for {satellite} from {source}");
+            let sets = if added == 1 { "a set".to_owned() } else { format!("{added} sets") };
+            let message = format!("{who} added {sets} of elements for {satellite} from {source}");
             self.sky_event(now.utc, s, EventKind::Elements, Level::Normal, message);
         }
         Ok(Accepted::Done)

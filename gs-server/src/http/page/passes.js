@@ -6,8 +6,8 @@ import { model, now } from "./model.js";
 
 const MARKS = { watch: "○", warning: "△", distress: "◇" };
 // Rows of a satellite that is alone, and of one among several.
-const ROWS = 6;
-const ROWS_AMONG_SEVERAL = 3;
+const ROWS = 5;
+const ROWS_AMONG_SEVERAL = 2;
 // No picture is asked for more often than this, in wall time.
 const SKY_MS = 4000;
 const TIMELINE_MS = 15000;
@@ -45,6 +45,7 @@ export function paintPasses() {
   if (key !== tiles) {
     tiles = key;
     clocks = [];
+    byId("pass-tiles").classList.toggle("several", satellites.length > 1);
     byId("pass-tiles").replaceChildren(...satellites.map((s) => tile(s, t)));
   }
   for (const [node, name] of clocks) {
@@ -203,13 +204,12 @@ function paintTimeline(satellites, t) {
   const known = satellites.filter((s) => s.next_passes.length > 0);
   const panel = byId("timeline-panel");
   panel.hidden = known.length === 0;
-  document.body.classList.toggle("has-timeline", known.length > 0);
   const width = Math.max(280, Math.round(byId("timeline-box").clientWidth));
   if (known.length === 0) return timeline.hide();
   const start = new Date(t).toISOString();
   timeline.show(
     JSON.stringify([known.map((s) => [s.satellite, s.elements?.id]), Math.floor(t / TIMELINE_STEP_MS), width, byDay.matches]),
-    `passes/timeline.svg?start=${start}&width=${width}`,
+    `passes/timeline.svg?start=${start}&width=${width}&form=compact`,
     "Passes of the next two days",
   );
 }

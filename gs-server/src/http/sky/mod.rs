@@ -164,7 +164,10 @@ fn search(
 ) -> Result<PassSearch, Failure> {
     let min_elevation_deg = min_elevation_deg.unwrap_or(site.min_elevation_deg);
     if !(-90.0..=90.0).contains(&min_elevation_deg) {
-        return Err(bad("min_elevation", format!("must lie from -90 to 90 degrees, found {min_elevation_deg}")));
+        return Err(bad(
+            "min_elevation",
+            format!("must lie from -90 to 90 degrees, found {min_elevation_deg}"),
+        ));
     }
     Ok(PassSearch { orientation: site.orientation, ..PassSearch::new(start, stop, min_elevation_deg) })
 }
@@ -190,7 +193,9 @@ fn found(
     let too_many = || {
         bad(
             "stop",
-            format!("there are more than {ROWS_MAX} passes: choose a shorter window or a higher min_elevation"),
+            format!(
+                "there are more than {ROWS_MAX} passes: choose a shorter window or a higher min_elevation"
+            ),
         )
     };
     match found {

@@ -39,7 +39,8 @@ pub(in crate::http) async fn passes(
     let frequency_hz = frequency(asked.frequency)?;
     let known = known(&app, asked.satellite.as_deref(), window).await?;
     let over = place(&app, &site);
-    let found = compute(&app, move || found(&known.objects, over, &search, frequency_hz).map(|found| (found, known)));
+    let found =
+        compute(&app, move || found(&known.objects, over, &search, frequency_hz).map(|found| (found, known)));
     let (found, known) = found.await?;
     Ok(Json(PassList {
         station: app.state.identity.station.to_string(),

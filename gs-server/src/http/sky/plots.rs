@@ -10,7 +10,9 @@ use super::super::App;
 use super::super::extract::{Query, satellite};
 use super::super::problem::Failure;
 use super::{DAY_US, bad, check_calendar, compute, found, known, now, place, search, site, window};
-use crate::sky::{Object, PlotForm, Theme, Timeline, fine_time, instant, plot_pass_at, timeline_svg_of_width};
+use crate::sky::{
+    Object, PlotForm, Theme, Timeline, fine_time, instant, plot_pass_at, timeline_svg_of_width,
+};
 
 /// How far ahead a pass is sought for its plot.
 const AHEAD_US: i64 = 14 * DAY_US;
@@ -61,9 +63,10 @@ pub(in crate::http) async fn sky(
         let picture = set.map(|set| plot_pass_at(pass, set, &over, search.orientation, at, asked.form));
         match picture {
             Some(Ok(svg)) => Ok(asked.theme.paint(&svg)),
-            Some(Err(error)) => {
-                Err(Failure::new(ProblemKind::NotFound, format!("The pass of {satellite} cannot be drawn: {error}.")))
-            }
+            Some(Err(error)) => Err(Failure::new(
+                ProblemKind::NotFound,
+                format!("The pass of {satellite} cannot be drawn: {error}."),
+            )),
             None => Err(Failure::new(ProblemKind::Internal, "The elements of the pass are gone.")),
         }
     });
@@ -78,6 +81,8 @@ pub(in crate::http) struct AskedTimeline {
     stop: Option<FineTime>,
     min_elevation: Option<f64>,
     width: Option<u32>,
+    #[serde(default)]
+    form: PlotForm,
     #[serde(default)]
     theme: Theme,
 }
@@ -99,7 +104,7 @@ pub(in crate::http) async fn timeline(
     let svg = compute(&app, move || {
         let found = found(&known.objects, over, &search, None)?;
         let timeline = Timeline { start: search.start, stop: search.stop, passes: &found.passes };
-        Ok(asked.theme.paint(&timeline_svg_of_width(&timeline, width_px)))
+        Ok(asked.theme.paint(&timeline_svg_of_width(&timeline, width_px, asked.form)))
     });
     Ok(drawn(svg.await?))
 }

@@ -8,6 +8,7 @@ mod kill;
 mod records;
 mod redecode;
 mod refusals;
+mod sky;
 mod snapshot;
 mod telemetry;
 
