@@ -156,3 +156,78 @@ fn high_enough(pass: &PassFacts, wanted_deg: f64) -> Result<(), NoMatch> {
         Err(NoMatch::TooLow { found_deg: pass.max_elevation_deg, wanted_deg })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::step::{AtLos, MinPass};
+    use crate::{PlanName, UtcUs};
+
+    fn plan(attach: Option<AttachRule>) -> Plan {
+        Plan {
+            name: PlanName::new("test").unwrap(),
+            satellite: SatelliteId::new("pixelsat-1").unwrap(),
+            priority: 0,
+            worth: 1.0,
+            min_pass: MinPass { max_elevation_deg: 10.0, duration_us: 100_000_000 },
+            limit_us: None,
+            at_los: AtLos::Stop,
+            transmit: false,
+            attach,
+            steps: Vec::new(),
+        }
+    }
+
+    /// Culminates at 23:30 UTC.
+    fn pass() -> PassFacts {
+        PassFacts {
+            satellite: SatelliteId::new("pixelsat-1").unwrap(),
+            tca: UtcUs((20_000 * 1440 + 23 * 60 + 30) * MINUTE_US),
+            max_elevation_deg: 30.0,
+            duration_us: 400_000_000,
+            sunlit: Some(false),
+            matched_before: 4,
+        }
+    }
+
+    #[test]
+    fn each_part_of_a_rule_can_refuse() {
+        let rule = AttachRule {
+            min_max_elevation_deg: Some(30.0),
+            hours_utc: vec![Hours { from_min: 18 * 60, to_min: 6 * 60 }],
+            sunlit: Some(false),
+            every: 2,
+        };
+        let with = |change: fn(&mut AttachRule, &mut PassFacts)| {
+            let (mut rule, mut pass) = (rule.clone(), pass());
+            change(&mut rule, &mut pass);
+            plan(Some(rule)).attaches_to(&pass)
+        };
+        assert_eq!(with(|_, _| ()), Ok(()));
+        assert_eq!(plan(None).attaches_to(&pass()), Err(NoMatch::NoRule));
+        let other =
+            |_: &mut AttachRule, pass: &mut PassFacts| pass.satellite = SatelliteId::new("x").unwrap();
+        assert_eq!(with(other), Err(NoMatch::Satellite));
+        let low = NoMatch::TooLow { found_deg: 29.9, wanted_deg: 30.0 };
+        assert_eq!(with(|_, pass| pass.max_elevation_deg = 29.9), Err(low));
+        let short = NoMatch::TooShort { found_s: 99, wanted_s: 100 };
+        assert_eq!(with(|_, pass| pass.duration_us = 99_999_999), Err(short));
+        assert_eq!(with(|_, pass| pass.tca = pass.tca.plus(13 * 3_600_000_000)), Err(NoMatch::Hours));
+        let light = NoMatch::Light { wanted_sunlit: false };
+        assert_eq!(with(|_, pass| pass.sunlit = Some(true)), Err(light.clone()));
+        assert_eq!(with(|_, pass| pass.sunlit = None), Err(light));
+        assert_eq!(with(|_, pass| pass.matched_before = 5), Err(NoMatch::NotItsTurn { every: 2 }));
+        assert_eq!(with(|rule, pass| (rule.every, pass.matched_before) = (1, 5)), Ok(()));
+    }
+
+    #[test]
+    fn hours_go_over_midnight() {
+        let night = Hours { from_min: 18 * 60, to_min: 6 * 60 };
+        let day = Hours { from_min: 6 * 60, to_min: 18 * 60 };
+        for minute in 0..1440 {
+            assert_ne!(night.contains(minute), day.contains(minute), "{minute}");
+            assert!(Hours { from_min: 77, to_min: 77 }.contains(minute));
+        }
+        assert!(night.contains(18 * 60) && !night.contains(6 * 60));
+    }
+}

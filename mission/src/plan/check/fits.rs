@@ -86,7 +86,11 @@ impl Checker<'_> {
         let mut at_us = from_us;
         for (at, step) in steps.iter().enumerate() {
             let place = format!("{place}[{at}]");
-            let begin_us = begin_us(&step.when, at_us);
+            // What is left for the next pass is come to at its beginning.
+            let begin_us = match self.plan.at_los {
+                AtLos::Stop => begin_us(&step.when, at_us),
+                AtLos::FinishLater => begin_us(&step.when, 0),
+            };
             if let Some(before_us) = step.when.before_los_us
                 && begin_us.saturating_add(before_us) > duration_us
                 && begin_us <= duration_us

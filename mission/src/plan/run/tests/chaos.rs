@@ -182,7 +182,7 @@ fn try_find<'a>(steps: &'a [Step], place: &str) -> Option<&'a Step> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1500))]
+    #![proptest_config(ProptestConfig::with_cases(500))]
 
     /// The promises are asserted by the world at every call; here the process dies before or after the commit, whenever
     /// it likes.
