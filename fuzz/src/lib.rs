@@ -1,4 +1,4 @@
-//! One fuzz body per decoder of the wire and of what a radio module answers. A body takes any bytes and asserts what
+//! One fuzz body per decoder of the wire, of what a radio module answers, and of elements. A body takes any bytes and asserts what
 //! must hold for all bytes: no panic, bounds, round trips, and for the stream decoders the same result as a naive reading
 //! of the ICD.
 //!
@@ -7,11 +7,13 @@
 //! file in the corpus.
 
 mod down;
+mod elements;
 mod radio_driver;
 mod radio_reply;
 mod up;
 
 pub use down::{down_frame, down_stream, downlink_payload};
+pub use elements::elements;
 pub use radio_driver::radio_driver;
 pub use radio_reply::radio_reply;
 pub use up::{sealed_open, telecommand_payload, up_stream};
@@ -20,7 +22,7 @@ pub use up::{sealed_open, telecommand_payload, up_stream};
 pub type Body = fn(&[u8]);
 
 /// Every body by the name of its corpus folder and fuzz target.
-pub const BODIES: [(&str, Body); 8] = [
+pub const BODIES: [(&str, Body); 9] = [
     ("down_stream", down_stream),
     ("down_frame", down_frame),
     ("downlink_payload", downlink_payload),
@@ -29,6 +31,7 @@ pub const BODIES: [(&str, Body); 8] = [
     ("sealed_open", sealed_open),
     ("radio_reply", radio_reply),
     ("radio_driver", radio_driver),
+    ("elements", elements),
 ];
 
 /// Feeds a stream in pieces whose lengths a few input bytes choose.

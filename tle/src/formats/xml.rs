@@ -61,6 +61,8 @@ impl Iterator for Reader<'_> {
             Ok(()) => Some(fields.assemble()),
             Err((offset, said)) => {
                 let at = line + count_lines(rest.get(..offset).unwrap_or_default());
+                // The parser quotes what it found, with whatever line ends stand in it.
+                let said = said.chars().take(160).map(|c| if c.is_control() { ' ' } else { c }).collect();
                 Some(Err(fields.error(at, SetFault::Syntax { form: "XML", said })))
             }
         }
