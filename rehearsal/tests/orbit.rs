@@ -1,5 +1,7 @@
 //! Real geometry: days under an orbit, with everything joined.
 
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
 use rehearsal::{Chaos, Invariant, Operator, Report, Violation, World, WorldConfig};
 use satellite::{Orbit, PassProfile, Sky};
 use tle::{Station, UtcInstant};
