@@ -98,7 +98,11 @@ pub fn orbit_from(file: &Path, wanted: Option<&str>, at: UtcInstant) -> Result<O
     }
     let [object] = &catalogue.objects[..] else {
         let some: Vec<String> = catalogue.objects.iter().take(NAMES_SHOWN).map(Object::label).collect();
-        return Err(OrbitError::Choose { path: path(), count: catalogue.objects.len(), some: some.join(", ") });
+        return Err(OrbitError::Choose {
+            path: path(),
+            count: catalogue.objects.len(),
+            some: some.join(", "),
+        });
     };
     Orbit::new(object.set_for(at).clone()).map_err(|source| OrbitError::Elements {
         path: path(),
@@ -150,9 +154,6 @@ mod tests {
         assert!(matches!(read("<html>", None), Err(OrbitError::Text { .. })));
         let broken = read(&ISS.replace("  9992", "  9991"), None).unwrap_err();
         assert!(broken.to_string().contains("line 2"), "{broken}");
-        assert!(matches!(
-            orbit_from(Path::new("/nowhere/at.all"), None, at()),
-            Err(OrbitError::File { .. })
-        ));
+        assert!(matches!(orbit_from(Path::new("/nowhere/at.all"), None, at()), Err(OrbitError::File { .. })));
     }
 }
