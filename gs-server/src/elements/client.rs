@@ -47,7 +47,11 @@ pub(super) fn http_client(url: &Url, patience: Duration) -> Result<Client, Strin
         .timeout(patience);
     // A proxy is for the world outside.
     let builder = if is_loopback(url) { builder.no_proxy() } else { builder };
-    builder.build().map_err(|error| chain(&error))
+    // Without TLS no certificates are needed: our own server is reached on a machine that has none.
+    let plain = url.scheme() == "http";
+    let builder = if plain { builder.tls_certs_only(std::iter::empty()) } else { builder };
+    let remedy = if plain { "" } else { ": install the certificates of this system (ca-certificates)" };
+    builder.build().map_err(|error| format!("no secure connection can be made: {}{remedy}", chain(&error)))
 }
 
 /// The error and its reasons; the address is left out, it is said elsewhere.
