@@ -13,6 +13,8 @@ const SKY_MS = 4000;
 const TIMELINE_MS = 15000;
 // The timeline begins anew after so much of the station's time.
 const TIMELINE_STEP_MS = 600000;
+// And so long ago, that a pass that lasts is whole.
+const BEFORE_MS = 900000;
 const REMEDY_MS = 30000;
 
 const byDay = window.matchMedia("(prefers-color-scheme: light)");
@@ -68,7 +70,8 @@ const age = (s) => (s.elements ? Math.floor(s.elements.age_days * 10) : null);
 function tile(s, t) {
   const box = make("div", "tile");
   const head = make("p", "tile-head");
-  head.append(make("strong", "", s.satellite), make("span", s.expectation.includes("overdue") ? "level-distress" : "dim", s.expectation));
+  const isLate = s.expectation.includes("overdue");
+  head.append(make("strong", "", s.satellite), make("span", isLate ? "level-distress" : "dim", isLate ? `${MARKS.distress} ${s.expectation}` : s.expectation));
   box.append(head);
   const passes = s.next_passes.filter((pass) => pass.los === null || ms(pass.los) > t);
   if (passes.length > 0) {
@@ -206,7 +209,7 @@ function paintTimeline(satellites, t) {
   panel.hidden = known.length === 0;
   const width = Math.max(280, Math.round(byId("timeline-box").clientWidth));
   if (known.length === 0) return timeline.hide();
-  const start = new Date(t).toISOString();
+  const start = new Date(t - BEFORE_MS).toISOString();
   timeline.show(
     JSON.stringify([known.map((s) => [s.satellite, s.elements?.id]), Math.floor(t / TIMELINE_STEP_MS), width, byDay.matches]),
     `passes/timeline.svg?start=${start}&width=${width}&form=compact`,
