@@ -107,7 +107,7 @@ async fn any_other_answer_stops_it_until_an_operator_says_so_across_restarts() {
                 let headers = [("location", target.as_str())];
                 Some(say_with(
                     status,
-                    if status < 400 && status >= 300 { &headers } else { &[] },
+                    if (300..400).contains(&status) { &headers } else { &[] },
                     "nope, sorry",
                 ))
             }
