@@ -14,6 +14,8 @@ mod passes;
 mod plan;
 mod radio;
 mod redecode;
+mod rig;
+mod rotator;
 mod serve;
 mod shell;
 mod sky;
@@ -83,6 +85,12 @@ pub enum Command {
     /// Plans: what to do in a pass. Begin one, check one
     #[command(subcommand)]
     Plan(plan::Plan),
+    /// The antenna's rotator by hand, through rotctld
+    #[command(subcommand)]
+    Rotator(rotator::Rotator),
+    /// A rig by hand, through rigctld
+    #[command(subcommand)]
+    Rig(rig::Rig),
     /// Make and list key files; their bytes are never printed
     #[command(subcommand)]
     Key(key::Key),
@@ -119,6 +127,8 @@ impl Cli {
             Command::Passes(passes) => passes.run(),
             Command::Look(look) => look.run(),
             Command::Radio(radio) => radio.run(),
+            Command::Rotator(rotator) => rotator.run(),
+            Command::Rig(rig) => rig.run(),
             Command::Elements(elements) => elements.run(),
             Command::Key(key) => key.run(),
             Command::Plan(plan) => plan.run(),

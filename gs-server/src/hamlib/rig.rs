@@ -44,7 +44,8 @@ impl RigClient {
             Err(_) => false,
         };
         let mut client = Self { connection, info: None, names_vfo };
-        client.info = match client.ask("get_info", "").await {
+        // This one takes no VFO, not even with `-o`: a name of one would be taken for part of the next command.
+        client.info = match client.connection.ask("get_info", "").await {
             Ok(lines) => value(&lines, "Info").map(|info| info.chars().take(80).collect()),
             Err(error) if error.breaks_connection() => return Err(error),
             Err(_) => None,

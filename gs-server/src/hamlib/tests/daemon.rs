@@ -25,7 +25,7 @@ pub(super) enum Manner {
     Broken(i32),
     /// Sends these bytes for every answer.
     Saying(String),
-    /// Answers a byte at a time, with pauses.
+    /// Answers in pieces, with pauses.
     Dripping,
     /// Ends in the middle of an answer.
     Cutting,
@@ -33,6 +33,8 @@ pub(super) enum Manner {
     Repeating,
     /// Says `RPRT 0` to everything and does not move.
     Frozen,
+    /// Tells a position that is no number.
+    Nan,
     /// Tells a position far away, every fifth time.
     Jumping,
     /// Knows neither limits nor name, and is silent about it.
@@ -197,6 +199,7 @@ impl State {
                 ))
             }
             "get_info" => done("Info: our own\n".into()),
+            "get_pos" if self.manner == Manner::Nan => done("Azimuth: nan\nElevation: nan\n".into()),
             "get_pos" => {
                 self.asked += 1;
                 let jump = if self.manner == Manner::Jumping && self.asked % 5 == 0 { 170.0 } else { 0.0 };
@@ -264,9 +267,9 @@ async fn speak(writer: &mut OwnedWriteHalf, reply: &str, manner: &Manner) -> boo
         Manner::Silent => return true,
         Manner::Saying(text) => writer.write_all(text.as_bytes()).await,
         Manner::Dripping => {
-            for byte in reply.as_bytes() {
+            for piece in reply.as_bytes().chunks(11) {
                 wall_sleep(Duration::from_millis(1)).await;
-                if writer.write_all(&[*byte]).await.is_err() {
+                if writer.write_all(piece).await.is_err() {
                     return false;
                 }
             }

@@ -9,7 +9,7 @@ mod tuning;
 use std::sync::Arc;
 use std::time::Duration;
 
-use mission::pointing::{SkySample, look_at, sky_path};
+use mission::pointing::look_at;
 use mission::{Clock as _, MonoUs, SatelliteId, Site, UtcUs};
 use tle::formats::{Checksums, sets};
 use tle::passes::{Pass, PassFinder, PassSearch};
@@ -62,11 +62,6 @@ pub(super) fn tracking(pass: &Pass) -> Tracking {
 pub(super) fn direction(at: UtcUs) -> mission::pointing::Direction {
     let look = look_at(&Propagator::new(&elements()).unwrap(), &site(), at).unwrap();
     mission::pointing::Direction::new(look.azimuth_deg, look.elevation_deg)
-}
-
-pub(super) fn path(pass: &Pass) -> Vec<SkySample> {
-    let t = tracking(pass);
-    sky_path(&t.elements, &t.site, t.aos, t.los).unwrap()
 }
 
 /// A station in stepped time: a clock that stands still until everybody waits, and the tasks under test.

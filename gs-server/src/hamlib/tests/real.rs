@@ -51,13 +51,15 @@ fn patience() -> Patience {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn rotctld_and_rigctld_are_driven_through_a_whole_pass() {
-    /// Simulated seconds per second: the dummy turns 7 degrees in one of the machine's.
+    /// Simulated seconds per second.
     const SPEED: f64 = 20.0;
+    /// The dummy turns by 6 to 7 degrees in one of the machine's.
+    const DUMMY_DEG_S: f64 = 5.5;
     let (rotctld, rigctld) = tokio::join!(Real::start("rotctld", &[]), Real::start("rigctld", &[]));
     // A low pass is slow enough for the dummy, and one that begins near north needs no long way.
     let starts_north = |pass: &Pass| {
         let azimuth = pass.aos.look.azimuth_deg;
-        pass.tca.look.elevation_deg < 25.0 && (azimuth < 70.0 || azimuth > 290.0) && pass.duration_s() > 240.0
+        pass.tca.look.elevation_deg < 25.0 && (azimuth < 90.0 || azimuth > 270.0) && pass.duration_s() > 240.0
     };
     let pass = passes()
         .into_iter()
@@ -65,12 +67,12 @@ async fn rotctld_and_rigctld_are_driven_through_a_whole_pass() {
         .min_by(|a, b| a.tca.look.elevation_deg.total_cmp(&b.tca.look.elevation_deg))
         .unwrap();
     let tracking = tracking(&pass);
-    let timer: Arc<dyn Timer> = Arc::new(ScaledClock::starting_at(SPEED, tracking.aos.plus(-260_000_000)));
+    let timer: Arc<dyn Timer> = Arc::new(ScaledClock::starting_at(SPEED, tracking.aos.plus(-380_000_000)));
     let rotator = RotatorSection {
         address: rotctld.address.clone(),
         azimuth_range: (-180.0, 450.0),
-        azimuth_rate_deg_s: 7.0 / SPEED,
-        elevation_rate_deg_s: 7.0 / SPEED,
+        azimuth_rate_deg_s: DUMMY_DEG_S / SPEED,
+        elevation_rate_deg_s: DUMMY_DEG_S / SPEED,
         ..RotatorSection::default()
     };
     let rig = RigSection {
@@ -89,7 +91,7 @@ async fn rotctld_and_rigctld_are_driven_through_a_whole_pass() {
     let mut witness = RotatorClient::connect(&rotctld.address, patience(), &witness_timer).await.unwrap();
     let mut ear = RigClient::connect(&rigctld.address, patience(), &witness_timer).await.unwrap();
     let mount = rotator.mount().unwrap();
-    let (mut worst_deg, mut worst_hz, mut samples) = (0.0_f64, 0.0_f64, 0);
+    let (mut worst_deg, mut worst_at_s, mut worst_hz, mut samples) = (0.0_f64, 0, 0.0_f64, 0);
     while timer.now().utc < tracking.los {
         wall_sleep(Duration::from_millis(50)).await;
         let position = witness.position().await.unwrap();
@@ -97,7 +99,10 @@ async fn rotctld_and_rigctld_are_driven_through_a_whole_pass() {
         if now < tracking.aos.plus(5_000_000) || now > tracking.los {
             continue;
         }
-        worst_deg = worst_deg.max(position.direction().angle_deg(mount.wanted(direction(now))));
+        let off_deg = position.direction().angle_deg(mount.wanted(direction(now)));
+        if off_deg > worst_deg {
+            (worst_deg, worst_at_s) = (off_deg, (now.0 - tracking.aos.0) / 1_000_000);
+        }
         let rate = look_at(&Propagator::new(&elements()).unwrap(), &site(), now).unwrap().range_rate_km_s;
         let heard = ear.reading().await.unwrap();
         worst_hz = worst_hz.max((heard.receive_hz - tle::doppler::received_hz(437.8e6, rate)).abs());
@@ -105,14 +110,16 @@ async fn rotctld_and_rigctld_are_driven_through_a_whole_pass() {
     }
     let status = handle.status();
     println!(
-        "{samples} looks, at worst {worst_deg:.2} degrees and {worst_hz:.0} Hz off; {} and {} commands; {:?}",
+        "pass of {:.0} degrees, {:.0} s; {samples} looks, at worst {worst_deg:.2} degrees (after {worst_at_s} s) and {worst_hz:.0} Hz off; {} and {} commands; {:?}",
+        pass.tca.look.elevation_deg,
+        pass.duration_s(),
         status.rotator.as_ref().unwrap().commands,
         status.rig.as_ref().unwrap().commands,
         status.rotator.as_ref().unwrap().trouble,
     );
     assert!(samples > 50, "{samples}");
     // Dead band, and what happens in two seconds of a pass that lasts a twentieth of its time; a loaded machine adds to it.
-    assert!(worst_deg < 8.0, "{worst_deg}");
+    assert!(worst_deg < 6.0, "{worst_deg}");
     assert!(worst_hz < 1_000.0, "{worst_hz}");
     assert_eq!(status.rotator.unwrap().info.as_deref(), Some("Dummy rotator"));
     assert!(status.rig.unwrap().commands > 50);

@@ -42,7 +42,7 @@ async fn through_a_whole_pass_both_frequencies_follow_the_shift_and_then_go_back
     bench.until(aos, |_, _| {}).await;
     let (mut worst, mut first, mut last) = (0.0_f64, None, 0.0);
     bench
-        .until(los, |bench, now| {
+        .until(los.plus(-2_000_000), |bench, now| {
             let state = daemon.state.lock().unwrap();
             let rate = range_rate(now);
             let receive = state.receive_hz - doppler::received_hz(DOWN_HZ, rate);
@@ -58,7 +58,7 @@ async fn through_a_whole_pass_both_frequencies_follow_the_shift_and_then_go_back
     assert!(first.unwrap() > 8_000.0 && last < -8_000.0, "{first:?} to {last}");
     let status = bench.rig();
     assert!(status.trouble.is_none() && status.residual_hz.unwrap().abs() <= 60.0, "{status:?}");
-    bench.seconds(10).await;
+    bench.seconds(15).await;
     assert_eq!(daemon.state.lock().unwrap().receive_hz, DOWN_HZ, "nominal again");
     assert_eq!(bench.rig().satellite, None);
     let sets = daemon.asked("set_freq");
