@@ -8,6 +8,7 @@
 
 mod files;
 mod help;
+mod plan;
 mod radio;
 mod twin;
 
