@@ -66,10 +66,11 @@ python() {
   fi
 }
 
-# End-to-end tests watch system calls and speak HTTP from outside.
+# End-to-end tests watch system calls, speak HTTP from outside, and drive hamlib's dummy rotator and rig.
 tools() {
   have strace || install_packages strace
   have curl || install_packages curl ca-certificates
+  { have rotctld && have rigctld; } || install_packages libhamlib-utils
 }
 
 # install_cargo_tool CRATE VERSION: builds it when it is not in the path. Its artefacts stay out of our target folder.
