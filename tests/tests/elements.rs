@@ -1,4 +1,5 @@
 //! Elements from the command line, without a server and beside one; sources that count who asks.
+#![expect(clippy::expect_used, reason = "a test that cannot be set up has failed, loudly")]
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener};
