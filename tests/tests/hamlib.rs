@@ -29,9 +29,10 @@ impl Daemon {
             .unwrap_or_else(|error| {
                 panic!("{program}: {error}; scripts/setup.sh tools installs libhamlib-utils")
             });
-        let address = format!("127.0.0.1:{port}");
-        let _took = until(&format!("{program} listens"), PATIENCE, || TcpStream::connect(&address).ok());
-        Self { child, address }
+        let daemon = Self { child, address: format!("127.0.0.1:{port}") };
+        let _took =
+            until(&format!("{program} listens"), PATIENCE, || TcpStream::connect(&daemon.address).ok());
+        daemon
     }
 }
 

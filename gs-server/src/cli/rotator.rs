@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
-use mission::pointing::{Mount, Pointer, Position};
 use mission::MonoUs;
+use mission::pointing::{Mount, Pointer, Position};
 use serde::Serialize;
 
 use super::shell::{print_json, print_line, runtime, stop_on_signals};

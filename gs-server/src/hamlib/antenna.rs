@@ -231,7 +231,6 @@ impl AntennaHandle {
 /// A task that the server runs for its whole life.
 pub struct AntennaTask {
     name: &'static str,
-    #[expect(clippy::type_complexity, reason = "one closure, called once")]
     run: Box<dyn FnOnce(CancellationToken) -> BoxFuture<'static, ()> + Send>,
 }
 

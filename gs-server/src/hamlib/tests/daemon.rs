@@ -202,7 +202,8 @@ impl State {
             "get_pos" if self.manner == Manner::Nan => done("Azimuth: nan\nElevation: nan\n".into()),
             "get_pos" => {
                 self.asked += 1;
-                let jump = if self.manner == Manner::Jumping && self.asked % 5 == 0 { 170.0 } else { 0.0 };
+                let jump =
+                    if self.manner == Manner::Jumping && self.asked.is_multiple_of(5) { 170.0 } else { 0.0 };
                 let Position { azimuth_deg, elevation_deg } = self.position;
                 done(format!("Azimuth: {:.2}\nElevation: {elevation_deg:.2}\n", azimuth_deg + jump))
             }

@@ -27,14 +27,14 @@ impl Real {
             .unwrap_or_else(|error| {
                 panic!("{program}: {error}; install libhamlib-utils (scripts/setup.sh tools)")
             });
-        let address = format!("127.0.0.1:{port}");
+        let daemon = Self { child, address: format!("127.0.0.1:{port}") };
         for _ in 0..500 {
-            if tokio::net::TcpStream::connect(&address).await.is_ok() {
-                return Self { child, address };
+            if tokio::net::TcpStream::connect(&daemon.address).await.is_ok() {
+                return daemon;
             }
             wall_sleep(Duration::from_millis(10)).await;
         }
-        panic!("{program} does not listen at {address}");
+        panic!("{program} does not listen at {}", daemon.address);
     }
 }
 
@@ -59,7 +59,7 @@ async fn rotctld_and_rigctld_are_driven_through_a_whole_pass() {
     // A low pass is slow enough for the dummy, and one that begins near north needs no long way.
     let starts_north = |pass: &Pass| {
         let azimuth = pass.aos.look.azimuth_deg;
-        pass.tca.look.elevation_deg < 25.0 && (azimuth < 90.0 || azimuth > 270.0) && pass.duration_s() > 240.0
+        pass.tca.look.elevation_deg < 25.0 && !(90.0..=270.0).contains(&azimuth) && pass.duration_s() > 240.0
     };
     let pass = passes()
         .into_iter()
