@@ -10,12 +10,12 @@ use super::sky::Sky;
 
 /// The two states about a summit are asked for this far from it, s.
 pub(super) const SUMMIT_OFFSET_S: f64 = 1.0;
-/// A crossing is settled when the next Newton step would move it by less than this, s.
+/// A crossing is settled when the next Newton step would move it by less than this, s: by what the velocity of a state near
+/// it may be wrong, and by what secants leave.
 const SETTLED_S: f64 = 5e-7;
-/// SGP4's velocity is not the derivative of its position: 8 cm/s off on round orbits, 2 m/s at low perigees of eccentric
-/// ones. As a part of the speed: so much of a Newton step is wrong.
-const VELOCITY_FLAW_ROUND: f64 = 1.5e-5;
-const VELOCITY_FLAW: f64 = 4e-4;
+const SETTLED_BY_BOUND_S: f64 = 2e-6;
+/// A summit is settled by a step of this part of the time in which the orbit turns by a radian there: 0.2 s in low orbits.
+const SUMMIT_STEP: f64 = 2.5e-4;
 
 /// A time and the true state at it.
 #[derive(Debug, Clone, Copy)]
@@ -24,16 +24,16 @@ pub(super) struct Place {
     pub(super) state: EarthFixed,
 }
 
-/// One Newton step from a true state towards the crossing; whether that settles it.
-pub(super) fn step_to_crossing(sky: &Sky<'_>, at: &Place, is_round: bool) -> (Place, bool) {
+/// One Newton step from a true state towards the crossing; whether that settles it. SGP4's velocity is not the derivative
+/// of its position, but off by so much at most: so much of a step is wrong.
+pub(super) fn step_to_crossing(sky: &Sky<'_>, at: &Place, velocity_flaw_km_s: f64) -> (Place, bool) {
     let (sight, bend) = sky.sight_of(&at.state);
     let dt = -sight.clearance / sight.clearance1;
-    let flaw = if is_round { VELOCITY_FLAW_ROUND } else { VELOCITY_FLAW };
-    // The flaw matters by the speed, not by its part along the clearance: the more, the flatter the crossing.
-    let steepness = norm(at.state.v_ecef_km_s) / sight.clearance1.abs();
-    let left = (0.5 * bend / sight.clearance1).abs() * dt * dt + flaw * steepness * dt.abs();
+    // The flaw matters as a whole, not by its part along the clearance: the more, the flatter the crossing.
+    let left = (0.5 * bend / sight.clearance1).abs() * dt * dt
+        + velocity_flaw_km_s / sight.clearance1.abs() * dt.abs();
     // NaN and infinity settle nothing.
-    let settled = dt.abs() < 0.05 && left < SETTLED_S;
+    let settled = dt.abs() < 0.05 && left < SETTLED_BY_BOUND_S;
     let dt = if dt.is_finite() { dt.clamp(-60.0, 60.0) } else { 0.0 };
     (moved(at, dt, at.state.v_ecef_km_s), settled)
 }
@@ -51,18 +51,17 @@ fn moved(at: &Place, dt: f64, velocity: Vec3) -> Place {
     }
 }
 
-/// The crossing near a true state from which one Newton step did not settle it: secants, which need no velocity, then
-/// halving.
+/// The crossing near a true state from which one Newton step did not settle it, and the state to which that step led:
+/// secants, which need no velocity, then halving.
 pub(super) fn crossing_from(
     sky: &Sky<'_>,
     motion: &mut Motion<'_>,
     first: &Place,
+    second: Place,
     bracket: [f64; 2],
     rising: bool,
 ) -> Result<Place, PropagationError> {
-    let mut before = *first;
-    let next_s = step_to_crossing(sky, first, motion.is_round()).0.t_s;
-    let mut at = Place { t_s: next_s, state: motion.at(next_s)? };
+    let (mut before, mut at) = (*first, second);
     for _ in 0..12 {
         let (clearance0, clearance) =
             (sky.clearance(before.state.r_ecef_km), sky.clearance(at.state.r_ecef_km));
@@ -173,7 +172,7 @@ pub(super) fn step_to_summit(
     }
     let sight = sky.sight(middle.r_ecef_km, by_position, a);
     let dt = -sight.climb / sight.climb1;
-    let settled = dt.abs() < 0.5 && sight.climb1 < 0.0;
+    let settled = dt.abs() < SUMMIT_STEP / jerk.sqrt() && sight.climb1 < 0.0;
     let dt = if dt.is_finite() { dt.clamp(-300.0, 300.0) } else { 0.0 };
     (moved(&Place { t_s, state: middle }, dt, by_position), settled)
 }
@@ -185,18 +184,19 @@ pub(super) fn summit(
     guess_s: f64,
 ) -> Result<Place, PropagationError> {
     let mut t_s = guess_s;
-    let mut place = Place { t_s, state: motion.at(t_s)? };
-    for _ in 0..4 {
-        let (before, after) = (motion.at(t_s - SUMMIT_OFFSET_S)?, motion.at(t_s + SUMMIT_OFFSET_S)?);
-        let (next, _) = step_to_summit(sky, t_s, &before, &after);
-        let moved_s = (next.t_s - t_s).abs();
-        place = next;
-        if moved_s < 0.05 {
-            break;
+    for _ in 0..3 {
+        let place = step_from_pair(sky, motion, t_s)?;
+        if (place.t_s - t_s).abs() < 0.05 {
+            return Ok(place);
         }
-        t_s = next.t_s;
+        t_s = place.t_s;
     }
-    Ok(place)
+    step_from_pair(sky, motion, t_s)
+}
+
+fn step_from_pair(sky: &Sky<'_>, motion: &mut Motion<'_>, t_s: f64) -> Result<Place, PropagationError> {
+    let (before, after) = (motion.at(t_s - SUMMIT_OFFSET_S)?, motion.at(t_s + SUMMIT_OFFSET_S)?);
+    Ok(step_to_summit(sky, t_s, &before, &after).0)
 }
 
 /// The sine of the elevation, as a measure to compare heights.

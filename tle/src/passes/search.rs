@@ -1,7 +1,6 @@
 //! The search over one satellite and its stations.
 
 use crate::elements::Elements;
-use crate::frames::EarthFixed;
 use crate::look::LookAngles;
 use crate::propagator::{ElementsError, PropagationError, Propagator};
 use crate::station::Station;
@@ -12,11 +11,10 @@ use super::grid::{Block, Grid, OrbitShape, Reach};
 use super::horizon;
 use super::motion::{Lanes, Motion};
 use super::pass::{EndCause, GAPS_MAX, Gap, Pass, PassEnd, PassPoint, SatellitePasses};
-use super::refine::{
-    Place, SUMMIT_OFFSET_S, crossing_from, sine_elevation, step_to_crossing, step_to_summit, summit,
-};
+use super::refine::{Place, sine_elevation};
 use super::request::{PassSearch, SearchError};
-use super::scan::{Draft, Edge, Scan};
+use super::scan::Scan;
+use super::settle::settle;
 use super::sky::Sky;
 
 /// How far outside the window the true ends of clipped passes are looked for: at most so many seconds, and revolutions.
@@ -235,120 +233,6 @@ impl Gaps {
         }
         self.open_since_s = last.t_s;
     }
-}
-
-/// Turns drafts into passes: true states at all ends and summits at once, and one Newton step from each.
-fn settle(
-    sky: &Sky<'_>,
-    motion: &mut Motion<'_>,
-    drafts: &[Draft],
-    start_s: f64,
-    stop_s: f64,
-) -> Vec<RawPass> {
-    let mut times = Vec::with_capacity(drafts.len() * 4);
-    for draft in drafts {
-        times.push(time_of(&draft.rise));
-        times.push(time_of(&draft.fall));
-        for &t_s in draft.summit_s.iter().chain(&draft.more_summits_s) {
-            times.push(t_s - SUMMIT_OFFSET_S);
-            times.push(t_s + SUMMIT_OFFSET_S);
-        }
-    }
-    let mut states = Vec::with_capacity(times.len());
-    motion.many(&times, &mut states);
-    let mut states = states.into_iter();
-    let mut passes = Vec::with_capacity(drafts.len());
-    for draft in drafts {
-        let (rise, fall) = (states.next().flatten(), states.next().flatten());
-        let mut summits = Vec::with_capacity(1 + draft.more_summits_s.len());
-        for &t_s in draft.summit_s.iter().chain(&draft.more_summits_s) {
-            let (before, after) = (states.next().flatten(), states.next().flatten());
-            summits.extend(settled_summit(sky, motion, t_s, before, after));
-        }
-        let inwards_s = if summits.is_empty() {
-            0.5 * (time_of(&draft.rise) + time_of(&draft.fall))
-        } else {
-            summits[0].t_s
-        };
-        let rise = settled_end(sky, motion, &draft.rise, rise, true, inwards_s);
-        let fall = settled_end(sky, motion, &draft.fall, fall, false, inwards_s);
-        let (Some(mut rise), Some(mut fall)) = (rise, fall) else { continue };
-        // A crossing in the first or last moment of the window may step out of it.
-        rise.place.t_s = rise.place.t_s.max(start_s);
-        fall.place.t_s = fall.place.t_s.min(stop_s);
-        // Only where elements are nonsense, and the quintics with them, are passes found that SGP4 does not bear out.
-        let last_s = passes.last().map_or(start_s, |pass: &RawPass| pass.fall.place.t_s);
-        if rise.place.t_s >= last_s && fall.place.t_s > rise.place.t_s {
-            summits.retain(|place| place.t_s >= rise.place.t_s && place.t_s <= fall.place.t_s);
-            passes.push(RawPass { rise, fall, summits });
-        }
-    }
-    passes
-}
-
-const fn time_of(edge: &Edge) -> f64 {
-    match *edge {
-        Edge::Near(t_s, _) | Edge::At(t_s) | Edge::Window(t_s) | Edge::Lost(t_s, _) => t_s,
-    }
-}
-
-fn settled_summit(
-    sky: &Sky<'_>,
-    motion: &mut Motion<'_>,
-    t_s: f64,
-    before: Option<EarthFixed>,
-    after: Option<EarthFixed>,
-) -> Option<Place> {
-    let (before, after) = (before?, after?);
-    let (place, settled) = step_to_summit(sky, t_s, &before, &after);
-    if settled { Some(place) } else { summit(sky, motion, t_s).ok() }
-}
-
-fn settled_end(
-    sky: &Sky<'_>,
-    motion: &mut Motion<'_>,
-    edge: &Edge,
-    state: Option<EarthFixed>,
-    rising: bool,
-    inwards_s: f64,
-) -> Option<RawEnd> {
-    let t_s = time_of(edge);
-    let Some(state) = state else {
-        // The theory gave out between two grid points that both had states: end the pass at the last that answers.
-        return lost_end(motion, t_s, inwards_s);
-    };
-    let place = Place { t_s, state };
-    let (place, cause) = match *edge {
-        Edge::Near(_, bracket) => {
-            let (next, settled) = step_to_crossing(sky, &place, motion.is_round());
-            if settled {
-                (next, EndCause::Horizon)
-            } else {
-                (crossing_from(sky, motion, &place, bracket, rising).ok()?, EndCause::Horizon)
-            }
-        }
-        Edge::At(_) => (place, EndCause::Horizon),
-        Edge::Window(_) => (place, EndCause::Window { crossing: None }),
-        Edge::Lost(_, fault) => (place, EndCause::NoState(fault)),
-    };
-    Some(RawEnd { place, cause })
-}
-
-fn lost_end(motion: &mut Motion<'_>, outside_s: f64, inside_s: f64) -> Option<RawEnd> {
-    let (mut bad_s, mut good_s) = (outside_s, inside_s);
-    let mut state = motion.at(good_s).ok()?;
-    let mut fault = motion.at(bad_s).err()?;
-    for _ in 0..60 {
-        let middle_s = 0.5 * (bad_s + good_s);
-        match motion.at(middle_s) {
-            Ok(found) => (good_s, state) = (middle_s, found),
-            Err(found) => (bad_s, fault) = (middle_s, found),
-        }
-        if (bad_s - good_s).abs() < 1e-6 {
-            break;
-        }
-    }
-    Some(RawEnd { place: Place { t_s: good_s, state }, cause: EndCause::NoState(fault) })
 }
 
 /// Writes a pass in instants and angles.
