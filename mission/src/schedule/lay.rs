@@ -7,7 +7,7 @@ use super::problem::{Blackout, Candidate, Health, Partial, Problem, Scope, Windo
 use super::task::Choice;
 use super::{PassKey, Worth};
 
-/// A day: no switch-over, no drift is longer.
+/// A day: no drift is longer.
 const DAY_S: u32 = 86_400;
 
 /// A closed time and why.
@@ -55,18 +55,16 @@ pub(super) const fn floor_s(us: i64) -> i64 {
 /// Lays out the question, on the remembered times where they still do.
 pub(super) fn lay(problem: &Problem, memory: &BTreeMap<&PassKey, &Remembered>) -> Layout {
     let drift_s = i64::from(problem.policy.drift_s.min(DAY_S));
-    let gap_s = problem
-        .antennas
-        .iter()
-        .map(|a| i64::from(a.switch_over_s.min(DAY_S)) + 2 * drift_s)
-        .collect::<Vec<_>>();
+    let gap_s = problem.antennas.iter().map(|a| i64::from(a.switch_over_s) + 2 * drift_s).collect::<Vec<_>>();
     let mut seen = BTreeSet::new();
+    let sane = |c: &&Candidate| nonsense(c, ceil_s(c.aos.0), floor_s(c.los.0)).is_none();
+    let first_s = problem.candidates.iter().filter(sane).map(|c| ceil_s(c.aos.0)).min().unwrap_or(0);
     let mut layout = Layout { laid: Vec::new(), choices: Vec::new(), gap_s, drift_s };
     for (index, candidate) in problem.candidates.iter().enumerate() {
         let (mut aos_s, mut los_s) = (ceil_s(candidate.aos.0), floor_s(candidate.los.0));
         if let Some(then) = memory.get(&candidate.key)
-            && (aos_s - then.aos_s).abs() <= drift_s
-            && (los_s - then.los_s).abs() <= drift_s
+            && aos_s.saturating_sub(then.aos_s).saturating_abs() <= drift_s
+            && los_s.saturating_sub(then.los_s).saturating_abs() <= drift_s
             && (los_s - aos_s).min(then.los_s - then.aos_s) >= i64::from(candidate.min_duration_s)
         {
             (aos_s, los_s) = (then.aos_s, then.los_s);
@@ -79,8 +77,10 @@ pub(super) fn lay(problem: &Problem, memory: &BTreeMap<&PassKey, &Remembered>) -
             closed: Vec::new(),
             rate: rate(candidate, los_s - aos_s),
         };
-        laid.refused = match nonsense(candidate, aos_s, los_s, !seen.insert(&candidate.key)) {
+        let repeated = !seen.insert(&candidate.key);
+        laid.refused = match nonsense(candidate, aos_s, los_s).or(repeated.then_some(REPEATED)) {
             Some(what) => Some(Reason::Invalid(what)),
+            None if aos_s - first_s > Candidate::MAX_HORIZON_S => Some(Reason::Invalid(FAR)),
             None => open(problem, candidate, index, &mut laid, &mut layout),
         };
         layout.laid.push(laid);
@@ -90,7 +90,10 @@ pub(super) fn lay(problem: &Problem, memory: &BTreeMap<&PassKey, &Remembered>) -
     layout
 }
 
-fn nonsense(candidate: &Candidate, aos_s: i64, los_s: i64, repeated: bool) -> Option<&'static str> {
+const REPEATED: &str = "key is used by an earlier candidate; every pass needs its own";
+const FAR: &str = "AOS is more than 31 days after the first one; plan it when it is nearer";
+
+fn nonsense(candidate: &Candidate, aos_s: i64, los_s: i64) -> Option<&'static str> {
     if los_s <= aos_s {
         Some("LOS must be at least a second after AOS")
     } else if los_s - aos_s > Candidate::MAX_DURATION_S {
@@ -99,8 +102,6 @@ fn nonsense(candidate: &Candidate, aos_s: i64, los_s: i64, repeated: bool) -> Op
         Some("value is 0; give it at least 1 point")
     } else if candidate.value > Candidate::MAX_VALUE {
         Some("value is above 1,000,000 points; scale the values down")
-    } else if repeated {
-        Some("key is used by an earlier candidate; every pass needs its own")
     } else {
         None
     }

@@ -66,6 +66,9 @@ impl Candidate {
     /// The longest pass that is taken for one, in seconds: a day.
     pub const MAX_DURATION_S: i64 = 86_400;
 
+    /// How far ahead is planned, in seconds from the first AOS: a month. Memory grows with it.
+    pub const MAX_HORIZON_S: i64 = 31 * 86_400;
+
     /// AOS to LOS.
     pub const fn window(&self) -> Window {
         Window { start: self.aos, stop: self.los }

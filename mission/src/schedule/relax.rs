@@ -12,8 +12,15 @@ use super::task::{Piece, Task};
 pub(super) struct Ahead {
     from_s: i64,
     earn: Vec<i64>,
-    /// The piece that begins in this second, in the best continuation: choice and end.
-    take: Vec<Option<(u32, i64)>>,
+    /// The piece that begins in this second, in the best continuation: choice and length, or [`NONE`].
+    take: Vec<(u32, u32)>,
+}
+
+/// No piece begins here.
+const NONE: (u32, u32) = (u32::MAX, 0);
+
+fn small(number: impl TryInto<u32>) -> u32 {
+    number.try_into().unwrap_or(u32::MAX)
 }
 
 /// A choice that can begin in the second that is looked at (going back in time).
@@ -41,7 +48,7 @@ impl Ahead {
     fn of(task: &Task, antenna: usize, prices: &[i64]) -> Self {
         let (from_s, until_s) = task.span_s();
         let length = usize::try_from(until_s - from_s).unwrap_or(0);
-        let mut ahead = Self { from_s, earn: vec![0; length + 1], take: vec![None; length + 1] };
+        let mut ahead = Self { from_s, earn: vec![0; length + 1], take: vec![NONE; length + 1] };
         let gap_s = task.gap_s[antenna];
         let mut by_latest: Vec<usize> =
             (0..task.choices.len()).filter(|&i| task.choices[i].antenna == antenna).collect();
@@ -64,18 +71,19 @@ impl Ahead {
                 });
             }
             let mut best = ahead.earn[index + 1];
-            let mut take = None;
+            let mut take = NONE;
             let mut ends = false;
             for o in &mut open {
                 let stop_s = at_s + o.min_s;
-                let with = o.rate * stop_s + ahead.earn(stop_s + gap_s);
+                // Counted from the begin: rate times a date would not fit into 64 bits.
+                let with = o.rate * (stop_s - from_s) + ahead.earn(stop_s + gap_s);
                 if with > o.reach {
                     (o.reach, o.end_s) = (with, stop_s);
                 }
-                let weight = o.reach - o.rate * at_s + o.extra;
+                let weight = o.reach - o.rate * (at_s - from_s) + o.extra;
                 if weight > best {
                     best = weight;
-                    take = Some((u32::try_from(o.choice).unwrap_or(u32::MAX), o.end_s));
+                    take = (small(o.choice), small(o.end_s - at_s));
                 }
                 ends |= o.last_s == at_s;
             }
@@ -92,14 +100,14 @@ impl Ahead {
     fn trace(&self, gap_s: i64, pieces: &mut Vec<Piece>) {
         let mut index = 0;
         while let Some(take) = self.take.get(index) {
-            match *take {
-                None => index += 1,
-                Some((choice, stop_s)) => {
-                    let start_s = self.from_s + index as i64;
-                    pieces.push(Piece { choice: choice as usize, start_s, stop_s });
-                    index = usize::try_from(stop_s + gap_s - self.from_s).unwrap_or(usize::MAX);
-                }
+            if *take == NONE {
+                index += 1;
+                continue;
             }
+            let start_s = self.from_s + index as i64;
+            let stop_s = start_s + i64::from(take.1);
+            pieces.push(Piece { choice: take.0 as usize, start_s, stop_s });
+            index = usize::try_from(stop_s + gap_s - self.from_s).unwrap_or(usize::MAX);
         }
     }
 }

@@ -304,3 +304,49 @@ fn undominated(layer: BTreeMap<State, Reached>) -> Vec<(State, Reached)> {
     }
     kept
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::relax::relax;
+    use super::*;
+
+    /// The first is cut neither for its neighbour's begin nor for its end, but so that the neighbour at its shortest is
+    /// done when the third begins. The search must find it by itself, without the answer of the relaxation.
+    #[test]
+    fn a_chain_of_shortest_pieces_moves_the_cut() {
+        let choice = |job, from_s, until_s, min_s, rate| {
+            let (candidate, antenna, promise) = (job, 0, 0);
+            Choice { job, candidate, antenna, from_s, until_s, min_s, rate, promise }
+        };
+        let choices = vec![choice(0, 0, 22, 2, 10), choice(1, 5, 33, 4, 7), choice(2, 26, 30, 4, 25)];
+        let task = Task { choices, gap_s: vec![1], jobs: 3 };
+        let relaxed = relax(&task);
+        let mut search = Search::new(&task, &relaxed, Vec::new());
+        assert_eq!(search.run(1000, &mut 1000), 328);
+        let ends: Vec<i64> = search.best.iter().map(|p| p.stop_s).collect();
+        assert_eq!(ends, [20, 25, 30]);
+    }
+
+    /// With one label at a time the search still ends, with an answer and an honest bound.
+    #[test]
+    fn a_narrow_search_says_what_it_gave_up() {
+        let choices: Vec<Choice> = (0..12)
+            .map(|n| Choice {
+                job: n / 2,
+                candidate: n,
+                antenna: n % 2,
+                from_s: 7 * (n as i64 / 2),
+                until_s: 7 * (n as i64 / 2) + 20,
+                min_s: 5,
+                rate: 3 + (n as i64 * 5) % 7,
+                promise: 0,
+            })
+            .collect();
+        let task = Task { choices, gap_s: vec![2, 3], jobs: 6 };
+        let relaxed = relax(&task);
+        let wide = Search::new(&task, &relaxed, Vec::new()).run(10_000, &mut 100_000);
+        let mut narrow = Search::new(&task, &relaxed, Vec::new());
+        let bound = narrow.run(1, &mut 0);
+        assert!(!narrow.best.is_empty() && task.weight(&narrow.best) <= wide && wide <= bound);
+    }
+}

@@ -100,8 +100,9 @@ pub(crate) fn best(problem: &Problem) -> i64 {
         let mut worth = vec![vec![i64::MIN; sets]; END + 1];
         worth[0][0] = 0;
         for tick in 0..END {
-            for set in 0..sets {
-                worth[tick + 1][set] = worth[tick + 1][set].max(worth[tick][set]);
+            let (now, next) = worth.split_at_mut(tick + 1);
+            for (next, now) in next[0].iter_mut().zip(&now[tick]) {
+                *next = (*next).max(*now);
             }
             for (i, c) in problem.candidates.iter().enumerate() {
                 let Some(passage) = of[i] else { continue };

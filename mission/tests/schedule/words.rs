@@ -88,6 +88,8 @@ fn nonsense_is_named() {
     assert!(with(&|c| c.los = mission::UtcUs(i64::MAX)).contains("more than a day"));
     assert!(with(&|c| c.aos = mission::UtcUs(i64::MIN)).contains("more than a day"));
     assert!(with(&|c| c.value = u32::MAX).contains("1,000,000"));
+    let far = plan(&home(vec![good.clone(), pass("chess", "home", 40 * 86_400, 40 * 86_400 + 600, 9)]), &[]);
+    assert!(far.refused[0].to_string().contains("plan it when it is nearer"), "{}", far.refused[0]);
     let twice = plan(&home(vec![good.clone(), good.clone()]), &[]);
     assert_eq!(twice.contacts.len(), 1);
     assert!(matches!(twice.refused[0].reason, Reason::Invalid(what) if what.contains("key")));
@@ -153,4 +155,36 @@ fn no_work_is_still_an_answer() {
     let schedule = plan(&problem, &[]);
     crate::rules::check(&problem, &schedule, "no states at all");
     assert!(schedule.gap() < 0.2, "{}", schedule.gap());
+}
+
+#[test]
+fn extremes_break_nothing() {
+    let month_s = 31 * 86_400;
+    let mut candidates = vec![pass("long", "home", 0, 86_400, 1_000_000)];
+    for n in 0..40 {
+        let aos_s = n * month_s / 40;
+        candidates.push(pass("short", "home", aos_s, aos_s + 1, 1_000_000));
+        candidates.push(pass("other", "home", aos_s, aos_s + 86_000, 1_000_000));
+    }
+    for (n, candidate) in candidates.iter_mut().enumerate() {
+        (candidate.min_duration_s, candidate.key.minute) = (1, n as i64);
+    }
+    let mut problem = home(candidates);
+    problem.antennas[0].switch_over_s = u32::MAX;
+    let forever =
+        mission::schedule::Window { start: mission::UtcUs(i64::MIN), stop: mission::UtcUs(i64::MAX) };
+    for drift_s in [0, 5, u32::MAX] {
+        problem.policy = Policy { drift_s, keep_permille: u32::MAX, max_states: 1000 };
+        let schedule = plan(&problem, &[]);
+        crate::rules::check(&problem, &schedule, "extremes");
+        let mut memory = schedule.memory;
+        crate::rules::check(&problem, &plan(&problem, &memory), "extremes, remembered");
+        for remembered in &mut memory {
+            (remembered.aos_s, remembered.los_s) = (i64::MIN, i64::MAX);
+        }
+        crate::rules::check(&problem, &plan(&problem, &memory), "extremes, badly remembered");
+    }
+    let reason = "always".to_owned();
+    problem.blackouts.push(Blackout { scope: Scope::Satellite(satellite("long")), window: forever, reason });
+    crate::rules::check(&problem, &plan(&problem, &[]), "shut for ever");
 }
