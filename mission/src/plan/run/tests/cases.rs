@@ -27,6 +27,40 @@ fn steps_follow_each_other_when_answered() {
 }
 
 #[test]
+fn a_step_of_several_telecommands_sends_each_in_every_round() {
+    let two = step(send([Telecommand::Ping, Telecommand::GetAdcsInfo]));
+    let repeat = step(Action::Repeat { steps: vec![two, ping()], until: None, at_most: 2 });
+    let mut world = World::new(plan(vec![repeat, ping()]), 480);
+    world.go_to(0);
+    let mut sent = Vec::new();
+    while world.end().is_none() {
+        for wish in world.advance(false) {
+            if let Wish::Command { ordinal, telecommand, .. } = wish {
+                sent.push((ordinal.0, telecommand.name()));
+                world.set(ordinal.0, Stage::Answered);
+            }
+        }
+    }
+    let round = ["Ping", "GetAdcsInfo", "Ping"];
+    let wanted = round.into_iter().chain(round).chain(["Ping"]);
+    assert_eq!(sent, (0..).zip(wanted).collect::<Vec<_>>());
+}
+
+#[test]
+fn an_ask_that_is_not_accepted_yet_is_waited_for() {
+    let mut world = World::new(plan(vec![ping()]), 480);
+    world.go_to(0);
+    let wishes = world.advance(true);
+    assert_eq!(commands(&wishes), ["Ping"]);
+    assert_eq!(commands(&world.advance(true)), [""; 0]);
+    world.carry_out(&wishes);
+    assert_eq!(commands(&world.advance(false)), [""; 0]);
+    world.asked.insert(Ordinal(0), AskState::Refused("the queue is full".to_owned()));
+    world.advance(false);
+    assert!(matches!(world.end(), Some(RunEnd::Aborted { why, .. }) if why.contains("queue is full")));
+}
+
+#[test]
 fn a_step_waits_for_all_its_conditions() {
     let when = Condition {
         min_elevation_deg: Some(20.0),
@@ -212,6 +246,24 @@ fn what_may_have_been_obeyed_is_not_asked_for_in_the_next_pass() {
         let wanted = if again { "CaptureImage" } else { "download" };
         assert_eq!(commands(&next.advance(false)), [wanted], "{stage}");
     }
+}
+
+#[test]
+fn the_next_pass_counts_its_times_anew() {
+    let steps = vec![step(Action::Listen { for_us: 50 * S }), step(Action::Listen { for_us: 60 * S })];
+    let mut world = World::new(Plan { at_los: AtLos::FinishLater, ..plan(steps) }, 100);
+    for s in [0, 50, 100] {
+        world.go_to(s);
+        world.advance(false);
+    }
+    assert_eq!(world.end(), Some(&RunEnd::Later));
+    let mut next = World::new((*world.plan).clone(), 100);
+    let progress = world.run.progress().for_next_pass();
+    next.run = PlanRun::resume(Arc::clone(&next.plan), next.window, progress);
+    next.go_to(10);
+    next.advance(false);
+    assert_eq!(next.run.current_step(), "steps[1]");
+    assert_eq!(next.run.next_wakeup(), Some(next.now.mono.plus(60 * S)));
 }
 
 #[test]
