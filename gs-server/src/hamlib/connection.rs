@@ -7,12 +7,15 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
 use super::error::HamlibError;
-use crate::clock::{Timer, within};
+use crate::clock::{Timer, wall_sleep, within};
 
 /// The longest line of an answer that is read.
 const LINE: usize = 1_024;
 /// The most lines of an answer; `dump_caps` has about a hundred.
 const LINES: usize = 256;
+
+/// What a daemon that hung up may take to compose itself.
+const HUNG_UP: Duration = Duration::from_millis(100);
 
 /// How long a daemon may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,6 +77,28 @@ impl Connection {
             timer: Arc::clone(timer),
             is_out_of_step: false,
         })
+    }
+
+    /// Opens, and asks a first question by `ask`. A daemon that is just closing its device behind its last client (rigctld
+    /// does) may hang up on the next one: it gets two more chances.
+    pub(super) async fn open_asking<T>(
+        address: &str,
+        patience: Patience,
+        timer: &Arc<dyn Timer>,
+        ask: impl AsyncFn(&mut Self) -> Result<T, HamlibError>,
+    ) -> Result<(Self, Result<T, HamlibError>), HamlibError> {
+        let mut chances = 3;
+        loop {
+            let mut connection = Self::open(address, patience, timer).await?;
+            let answer = ask(&mut connection).await;
+            chances -= 1;
+            if chances > 0 && matches!(answer, Err(HamlibError::Closed { .. })) {
+                let _held = timer.busy("second connection to hamlib");
+                wall_sleep(HUNG_UP).await;
+                continue;
+            }
+            return Ok((connection, answer));
+        }
     }
 
     pub(super) fn address(&self) -> &str {

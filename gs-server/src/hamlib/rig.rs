@@ -33,8 +33,12 @@ impl RigClient {
         patience: Patience,
         timer: &Arc<dyn Timer>,
     ) -> Result<Self, HamlibError> {
-        let mut connection = Connection::open(address, patience, timer).await?;
-        let names_vfo = match connection.ask_line("chk_vfo").await {
+        let (mut connection, answer) =
+            Connection::open_asking(address, patience, timer, async |connection| {
+                connection.ask_line("chk_vfo").await
+            })
+            .await?;
+        let names_vfo = match answer {
             Ok(line) => line.trim_start_matches("ChkVFO:").trim() == "1",
             Err(HamlibError::Silent { .. }) => {
                 connection = Connection::open(address, patience, timer).await?;

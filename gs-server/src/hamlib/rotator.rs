@@ -34,8 +34,12 @@ impl RotatorClient {
         patience: Patience,
         timer: &Arc<dyn Timer>,
     ) -> Result<Self, HamlibError> {
-        let mut connection = Connection::open(address, patience, timer).await?;
-        let limits = match connection.ask("dump_state", "").await {
+        let (mut connection, answer) =
+            Connection::open_asking(address, patience, timer, async |connection| {
+                connection.ask("dump_state", "").await
+            })
+            .await?;
+        let limits = match answer {
             Ok(lines) => limits(&connection, &lines),
             // Very old daemons do not know it, and say nothing. A late answer must not be taken for another.
             Err(HamlibError::Silent { .. }) => {

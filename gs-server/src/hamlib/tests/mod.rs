@@ -17,7 +17,7 @@ use tle::{EarthOrientation, Elements, Propagator, Station, UtcInstant};
 use tokio_util::sync::CancellationToken;
 
 use super::*;
-use crate::clock::{SteppedClock, SteppedOptions, Timer};
+use crate::clock::{BusyToken, SteppedClock, SteppedOptions, Timer};
 
 /// The elements of the tests, and a day on which they are good.
 pub(super) fn elements() -> Elements {
@@ -71,6 +71,8 @@ pub(super) struct Bench {
     pub(super) handle: Option<AntennaHandle>,
     pub(super) stop: CancellationToken,
     tasks: Vec<tokio::task::JoinHandle<()>>,
+    /// Time passes only in [`Bench::until`]: what a test does in between happens at one instant.
+    held: std::sync::Mutex<Option<BusyToken>>,
 }
 
 impl Bench {
@@ -86,10 +88,11 @@ impl Bench {
         rotator: Option<&crate::config::RotatorSection>,
         rig: Option<&crate::config::RigSection>,
     ) -> Self {
+        let held = std::sync::Mutex::new(Some(timer.busy("test")));
         let (handle, tasks) = antenna(rotator, rig, &timer).unwrap();
         let stop = CancellationToken::new();
         let tasks = tasks.into_iter().map(|task| tokio::spawn(task.run(stop.clone()))).collect();
-        Self { clock, timer, handle: Some(handle), stop, tasks }
+        Self { clock, timer, handle: Some(handle), stop, tasks, held }
     }
 
     pub(super) fn handle(&self) -> &AntennaHandle {
@@ -108,8 +111,11 @@ impl Bench {
     pub(super) async fn until(&self, at: UtcUs, mut look: impl FnMut(&Self, UtcUs)) {
         while self.clock.now().utc < at {
             let next = MonoUs((self.clock.now().mono.0 / 1_000_000 + 1) * 1_000_000 + 500_000);
-            let _awake = self.timer.sleep_until(next).await;
+            let sleep = self.timer.sleep_until(next);
+            drop(self.held.lock().unwrap().take());
+            let awake = sleep.await;
             look(self, self.clock.now().utc);
+            *self.held.lock().unwrap() = Some(awake);
         }
     }
 
