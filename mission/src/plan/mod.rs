@@ -7,7 +7,7 @@
 //! | [`approval`] | who allowed a critical command beforehand, and exactly which |
 //! | [`rule`] | which passes a plan attaches itself to |
 //! | [`need`] | the least time that a plan takes |
-//! | [`check`] | everything that is wrong with a plan, each with its place and remedy |
+//! | [`mod@check`] | everything that is wrong with a plan, each with its place and remedy |
 //! | [`view`] | what the machine sees, and what it wishes |
 //! | [`progress`] | how far a run has come: a plain value that outlives the process |
 //! | [`run`] | the machine: [`PlanRun`] |

@@ -6,11 +6,10 @@ use radio::airtime::LinkTiming;
 use super::condition::Condition;
 use super::step::{Action, Step};
 
-/// The least time from AOS to the end of the last step, microseconds. `fault` is told of each step that cannot begin
-/// in time: its place, and what it needs.
+/// The least time from AOS to the end of the last step, microseconds.
 ///
 /// Everything goes well here: nothing is lost, no heartbeat is in the way, what is waited for is there at once, an
-/// image is whole after one chunk.
+/// image is whole after one question.
 pub fn least_us(steps: &[Step], timing: &LinkTiming) -> u64 {
     list_us(steps, timing, 0)
 }
