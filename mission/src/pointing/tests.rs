@@ -29,7 +29,7 @@ fn passes(latitude_deg: f64, longitude_deg: f64) -> Vec<Vec<SkySample>> {
     let (elements, site) = (iss(), site(latitude_deg, longitude_deg));
     let start: UtcInstant = "2020-07-13T00:00:00Z".parse().unwrap();
     let search = PassSearch::new(start, start.plus_seconds(86_400.0), 0.0);
-    let found = PassFinder::new(&elements).unwrap().find(&[site.place.clone()], &search).unwrap();
+    let found = PassFinder::new(&elements).unwrap().find(std::slice::from_ref(&site.place), &search).unwrap();
     let path = |pass: &tle::passes::Pass| {
         sky_path(&elements, &site, UtcUs(pass.aos.at.unix_us()), UtcUs(pass.los.at.unix_us())).unwrap()
     };
