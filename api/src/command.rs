@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::ConditionText;
 use crate::Time;
 
 /// A telecommand that somebody wants sent.
@@ -26,6 +27,9 @@ pub struct CommandRequest {
     /// What must hold before it is radiated.
     #[serde(default)]
     pub gate: GateWord,
+    /// What else must hold before it is radiated: elevation, a beacon, values, the time in the pass.
+    #[serde(default)]
+    pub when: Option<ConditionText>,
     /// Not radiated after this.
     #[serde(default)]
     pub expires_at: Option<Time>,

@@ -153,6 +153,16 @@ kinds! {
     QueueFull 429 "queue-full" "Too many commands wait";
     /// Nothing is locked.
     NotLocked 409 "not-locked" "Nothing is locked";
+    /// No plan has this name.
+    UnknownPlan 404 "unknown-plan" "There is no such plan";
+    /// The plan is wrong; the message says where and what to do.
+    PlanRefused 422 "plan-refused" "The plan is refused";
+    /// Too many plans are in use.
+    PlansFull 409 "plans-full" "Too many plans are in use";
+    /// There is no such pass, or the plan does not take it.
+    PassRefused 409 "pass-refused" "The plan does not get this pass";
+    /// No plan runs at present.
+    NothingRuns 409 "nothing-runs" "No plan runs at present";
     /// Storage takes nothing at present.
     StorageFailing 503 "storage-failing" "Storage is failing";
     /// The station cannot take more at present.

@@ -363,7 +363,11 @@ pub(crate) fn newest_event(store: &Store) -> BoxFuture<'static, Result<Option<Ut
     async move { Ok(store.events(&query).await?.first().map(|event| event.record.at)) }.boxed()
 }
 
-pub(crate) async fn open_store(config: &Config, station: &StationId, brought: Option<Store>) -> Result<Store, RunError> {
+pub(crate) async fn open_store(
+    config: &Config,
+    station: &StationId,
+    brought: Option<Store>,
+) -> Result<Store, RunError> {
     let simulated = config.is_simulated();
     let store = match brought {
         Some(store) => store,
@@ -392,7 +396,10 @@ pub(crate) async fn open_store(config: &Config, station: &StationId, brought: Op
 }
 
 /// Owns what it reads with: a future that borrows it is not `Send` enough for whoever spawns a run.
-pub(crate) fn snapshot(store: &Store, station: &StationConfig) -> BoxFuture<'static, Result<Snapshot, StoreError>> {
+pub(crate) fn snapshot(
+    store: &Store,
+    station: &StationConfig,
+) -> BoxFuture<'static, Result<Snapshot, StoreError>> {
     let store = store.clone();
     let satellites: Vec<_> = station.satellites.iter().map(|satellite| satellite.id.clone()).collect();
     let keys: Vec<_> =

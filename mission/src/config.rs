@@ -5,6 +5,7 @@ use radio::airtime::LinkTiming;
 
 use crate::id::{LinkId, SatelliteId, StationId};
 use crate::limits::LimitRule;
+use crate::schedule::Window;
 use crate::sky::Site;
 
 /// A station with its satellites and links.
@@ -18,6 +19,19 @@ pub struct StationConfig {
     pub links: Vec<LinkConfig>,
     /// Where it stands; without it no pass is known.
     pub site: Option<Site>,
+    /// When it may transmit and when it is closed.
+    pub times: Times,
+}
+
+/// When a station may transmit, and when nothing is planned.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Times {
+    /// It may transmit in these windows only; `None`: always.
+    pub licence: Option<Vec<Window>>,
+    /// Nothing is planned in these: maintenance, wind, people on the roof; with the reason.
+    pub blackouts: Vec<(Window, String)>,
+    /// Between two satellites the antenna needs this long, s.
+    pub switch_over_s: u32,
 }
 
 /// A satellite: its profile, its key, its limits.

@@ -127,6 +127,14 @@ number!(
     PassId
 );
 number!(
+    /// A plan that was handed over, from 1, rising.
+    PlanId
+);
+number!(
+    /// An armed plan in one pass, from 1, rising.
+    RunId
+);
+number!(
     /// A batch of records that is stored whole or not at all; numbered within one life of the process.
     BatchId
 );

@@ -1,9 +1,12 @@
 //! What operators want, and what the engine says to it.
 
+use std::sync::Arc;
+
 use protocol::{KeyId, Telecommand};
 
 use crate::clock::UtcUs;
-use crate::id::{CommandId, DownloadId, IntentId, LinkId, Principal, SatelliteId};
+use crate::id::{CommandId, DownloadId, IntentId, LinkId, PlanName, Principal, SatelliteId};
+use crate::plan::{Condition, Plan};
 use crate::record::Gate;
 
 /// An intent with who, and the key under which it counts only once.
@@ -51,6 +54,38 @@ pub enum Intent {
         /// Where they came from, for people; no secrets.
         source: String,
     },
+    /// Use this plan. One of the same name is withdrawn, and its arming and passes with it.
+    AddPlan {
+        /// The plan.
+        plan: Arc<Plan>,
+        /// Its text, kept as it is.
+        text: Arc<str>,
+    },
+    /// Withdraw a plan.
+    WithdrawPlan(PlanName),
+    /// Let a plan run, or not. A run that lasts is stopped.
+    ArmPlan {
+        /// Which.
+        plan: PlanName,
+        /// Whether it may run.
+        armed: bool,
+    },
+    /// Choose a pass for a plan, or take the choice back.
+    AttachPlan {
+        /// Which plan.
+        plan: PlanName,
+        /// An instant within the pass.
+        at: UtcUs,
+        /// Choose, or take back.
+        attach: bool,
+    },
+    /// Take a satellite out of the hands of the plan that runs, or give it back.
+    TakeOver {
+        /// Which.
+        satellite: SatelliteId,
+        /// Take over, or give back.
+        held: bool,
+    },
     /// Let a link transmit, or not.
     ArmLink {
         /// Which.
@@ -75,6 +110,8 @@ pub struct CommandIntent {
     pub gate: Gate,
     /// Not radiated after this.
     pub expires_at: Option<UtcUs>,
+    /// What else must hold before it is radiated.
+    pub when: Option<Box<Condition>>,
     /// How often an idempotent command may be radiated; `None` for the engine's default. Others: once.
     pub attempts_allowed: Option<u16>,
     /// The name of the command, typed again: required where the command is critical.
@@ -161,6 +198,21 @@ pub enum Refusal {
     /// Nothing is locked for this key.
     #[error("sealing with key {0} is not locked")]
     NotLocked(KeyId),
+    /// No such plan.
+    #[error("plan: there is no plan '{0}'")]
+    UnknownPlan(String),
+    /// The plan is wrong.
+    #[error("plan: {0}")]
+    Plan(String),
+    /// There are too many plans.
+    #[error("{0} plans are in use already: withdraw some")]
+    PlansFull(usize),
+    /// No pass there, or not one that the plan takes.
+    #[error("at: {0}")]
+    Pass(String),
+    /// Nothing runs.
+    #[error("no plan runs for {0} at present")]
+    NothingRuns(SatelliteId),
     /// The station is shutting down.
     #[error("the station is stopping")]
     Stopping,

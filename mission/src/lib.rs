@@ -23,6 +23,7 @@ pub mod plan;
 pub mod pointing;
 pub mod port;
 pub mod record;
+pub mod run;
 pub mod schedule;
 pub mod sky;
 pub mod snapshot;
@@ -36,7 +37,7 @@ pub use config::{CounterRule, LinkConfig, Profile, SatelliteConfig, StationConfi
 pub use cover::{Cost, Cover, Range, cheapest_cover};
 pub use id::{
     AntennaId, BatchId, CommandId, DownloadId, ElementsId, FrameId, ImageId, IntentId, LinkId, PassId,
-    PlanName, Principal, SatelliteId, StationId, TxId,
+    PlanId, PlanName, Principal, RunId, SatelliteId, StationId, TxId,
 };
 pub use intent::{Accepted, CommandIntent, Intent, IntentEnvelope, IntentReceipt, Refusal};
 pub use level::Level;

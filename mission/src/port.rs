@@ -93,6 +93,11 @@ pub enum Input<'a> {
         /// `None`: not in view. `Some(los)`: in view until then; `los` is `None` when nobody knows.
         in_view: Option<Option<UtcUs>>,
     },
+    /// How the rotator is.
+    Antenna {
+        /// What is wrong with it, as a sentence; `None`: nothing.
+        fault: Option<&'a str>,
+    },
     /// Somebody wants something.
     Intent(IntentEnvelope),
     /// The time of `next_wakeup` has come.

@@ -14,6 +14,8 @@ use crate::id::{
 };
 use crate::intent::IntentReceipt;
 use crate::level::Level;
+use crate::plan::Condition;
+use crate::run::{PlanRecord, RunRecord};
 use crate::stage::Stage;
 
 /// Version of the rules by which values are derived from raw frames; derived rows carry it.
@@ -72,6 +74,10 @@ pub enum Record {
     Elements(ElementsRecord),
     /// A pass that began, got new elements or ended: inserted or brought up to date.
     Pass(PassRecord),
+    /// A plan, inserted or brought up to date.
+    Plan(PlanRecord),
+    /// A run of a plan, inserted or brought up to date. In the same batch as what it caused.
+    Run(Box<RunRecord>),
     /// Something to tell. Gets its place in the one durable sequence at the commit.
     Event(EventRecord),
     /// Who did what.
@@ -199,6 +205,8 @@ pub struct CommandRecord {
     pub created_at: UtcUs,
     /// After this it is not radiated any more.
     pub expires_at: Option<UtcUs>,
+    /// What else must hold before it is radiated; `None`: nothing.
+    pub when: Option<Box<Condition>>,
 }
 
 /// What must hold before a command is radiated.
@@ -497,6 +505,8 @@ pub enum EventKind {
     Contact,
     /// A pass began or ended, or its beacon is overdue.
     Pass,
+    /// A plan was handed over, armed, scheduled or dropped, or its run began or ended.
+    Plan,
     /// Elements were added, are getting old, or tell nothing.
     Elements,
     /// Sealing was locked, unlocked, or its clock is in doubt.
@@ -509,7 +519,7 @@ pub enum EventKind {
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::FrameHeard,
         Self::CommandStage,
         Self::ImageDeclared,
@@ -523,6 +533,7 @@ impl EventKind {
         Self::Link,
         Self::Contact,
         Self::Pass,
+        Self::Plan,
         Self::Elements,
         Self::Sealing,
         Self::Storage,
@@ -545,6 +556,7 @@ impl EventKind {
             Self::Link => "link",
             Self::Contact => "contact",
             Self::Pass => "pass",
+            Self::Plan => "plan",
             Self::Elements => "elements",
             Self::Sealing => "sealing",
             Self::Storage => "storage",

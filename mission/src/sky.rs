@@ -194,6 +194,14 @@ pub fn passes_of(
     Ok(found.stations.iter().flatten().map(|pass| PassAhead::of(pass, set.id)).collect())
 }
 
+/// Whether the Sun shines on a satellite at an instant; penumbra counts as shadow. `None` when it has no state then.
+#[must_use]
+pub fn sunlit_at(orbit: &tle::Propagator, at: UtcUs) -> Option<bool> {
+    let at = instant(at);
+    let state = orbit.at(at).ok()?;
+    Some(tle::shadow::light(state.r_teme_km, at) == tle::shadow::Light::Sunlit)
+}
+
 /// The engine's time as an instant of `tle`.
 #[must_use]
 pub const fn instant(at: UtcUs) -> UtcInstant {

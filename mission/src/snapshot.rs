@@ -7,6 +7,7 @@ use protocol::{Counter, KeyId, RequestTag};
 use crate::clock::UtcUs;
 use crate::id::{FrameId, SatelliteId};
 use crate::record::{CommandRecord, DownloadRecord, ImageRecord, LimitRecord, PassRecord};
+use crate::run::{PlanRecord, RunRecord};
 use crate::sky::ElementSet;
 use crate::stage::Stage;
 
@@ -19,6 +20,11 @@ pub struct Snapshot {
     pub satellites: Vec<SatelliteSnapshot>,
     /// Each key of the configuration.
     pub keys: Vec<KeySnapshot>,
+    /// The plans in use, by id.
+    pub plans: Vec<PlanRecord>,
+    /// By id: the runs that are not over, of each plan the newest that ended to be finished later, and of each satellite
+    /// the newest that ended.
+    pub runs: Vec<RunRecord>,
 }
 
 /// The highest ids in use; 0 when there are none.
@@ -36,6 +42,10 @@ pub struct LastIds {
     pub elements: u64,
     /// Of passes.
     pub pass: u64,
+    /// Of plans.
+    pub plan: u64,
+    /// Of runs.
+    pub run: u64,
 }
 
 /// What one satellite left.

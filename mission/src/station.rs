@@ -5,6 +5,10 @@
 //! | `journal` | what is to be made durable, in order, and what waits for it |
 //! | `sealing` | which counter a frame may be sealed with |
 //! | `contact` | when the satellite was heard, and when it transmits by itself |
+//! | `plans` | plans that were handed over |
+//! | `agenda` | which plan gets which pass |
+//! | `runner` | a plan in its pass |
+//! | `conditions` | what else must hold before a command leaves |
 //! | `sky` | elements and passes: whether the satellite is in view |
 //! | `link`, `satellite` | what is known of each |
 //! | `intake` | bytes to frames, frames to records |
@@ -19,7 +23,9 @@
 //! | `intents` | what operators want |
 //! | `restore` | how a new life begins |
 
+mod agenda;
 mod answer;
+mod conditions;
 mod contact;
 mod download;
 mod gate;
@@ -30,7 +36,9 @@ mod journal;
 mod link;
 mod outcome;
 mod packets;
+mod plans;
 mod restore;
+mod runner;
 mod satellite;
 mod sealing;
 mod sky;
@@ -44,17 +52,20 @@ use std::collections::VecDeque;
 use protocol::KeyId;
 
 use crate::clock::{MonoUs, Now, UtcUs};
-use crate::config::StationConfig;
-use crate::id::{FrameId, LinkId, Principal, SatelliteId, StationId};
+use crate::config::{StationConfig, Times};
+use crate::id::{AntennaId, FrameId, LinkId, Principal, SatelliteId, StationId};
 use crate::level::Level;
 use crate::port::{Effect, Input, LinkState};
 use crate::record::{AuditRecord, EventKind, EventRecord, Record, Route, Subject};
+use crate::run::{PlanRecord, RunRecord};
 use crate::sky::Site;
 use crate::snapshot::{LastIds, Snapshot};
 use crate::status::Status;
 
+use agenda::Agenda;
 use journal::Journal;
 use link::Link;
+use runner::Run;
 use satellite::Satellite;
 
 /// Where the engine's random bytes come from: the operating system, or a seed.
@@ -82,6 +93,18 @@ pub struct Station {
     satellites: Vec<Satellite>,
     links: Vec<Link>,
     site: Option<Site>,
+    times: Times,
+    antenna: AntennaId,
+    /// What is wrong with the rotator; `None`: there is none.
+    antenna_fault: Option<Option<String>>,
+    plans: Vec<PlanRecord>,
+    agenda: Agenda,
+    /// Runs that are not over.
+    runs: Vec<Run>,
+    /// Of each plan the run that is to be finished in the next pass.
+    unfinished: Vec<RunRecord>,
+    /// The LOS of the last run of each satellite.
+    last_ends: Vec<(SatelliteId, UtcUs)>,
     ids: LastIds,
     last_tx: u64,
     recent: VecDeque<Recent>,
@@ -136,6 +159,7 @@ impl Station {
                     satellite.contact.set_view(in_view);
                 }
             }
+            Input::Antenna { fault } => self.antenna_fault = Some(fault.map(str::to_owned)),
             Input::Intent(envelope) => self.intent(now, envelope),
             Input::Wake => {}
             Input::Stop => self.stopping = true,
@@ -173,6 +197,12 @@ impl Station {
             self.note_contact(now, s);
             self.expire(now, s);
             self.settle_overdue(now, s);
+        }
+        if !self.stopping {
+            self.agenda_step(now);
+            self.runs_step(now);
+        }
+        for s in 0..self.satellites.len() {
             self.uplink_step(now, s);
         }
         self.journal.flush(now.mono, &mut self.effects);

@@ -1,10 +1,15 @@
 //! How the station is right now: a view for watchers, never a record.
 
+use std::sync::Arc;
+
 use protocol::KeyId;
 
 use crate::clock::{Now, UtcUs};
-use crate::id::{CommandId, DownloadId, ImageId, LinkId, SatelliteId, StationId};
+use crate::id::{CommandId, DownloadId, ImageId, LinkId, PlanId, Principal, SatelliteId, StationId};
+use crate::plan::Plan;
 use crate::port::LinkState;
+use crate::run::RunRecord;
+use crate::schedule::Schedule;
 use crate::sky::{ElementSet, ElementsAge, PassAhead};
 
 /// The station now.
@@ -22,6 +27,38 @@ pub struct Status {
     pub sealing: Vec<SealingStatus>,
     /// Storage.
     pub storage: StorageStatus,
+    /// Each plan in use.
+    pub plans: Vec<PlanStatus>,
+    /// What is scheduled for the coming two days, what was refused and why.
+    pub schedule: Arc<Schedule>,
+    /// Runs that are not over.
+    pub runs: Vec<RunRecord>,
+    /// What the rotator says; `None` when there is none.
+    pub antenna: Option<AntennaStatus>,
+}
+
+/// A plan now.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanStatus {
+    /// Its number in the archive.
+    pub id: PlanId,
+    /// The plan.
+    pub plan: Arc<Plan>,
+    /// It may run.
+    pub armed: bool,
+    /// Passes that an operator chose.
+    pub picks: Vec<UtcUs>,
+    /// Who handed it over.
+    pub who: Principal,
+    /// When.
+    pub added_at: UtcUs,
+}
+
+/// The rotator now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AntennaStatus {
+    /// What is wrong with it, as a sentence; `None` when all is well.
+    pub fault: Option<String>,
 }
 
 /// One link now.

@@ -41,6 +41,7 @@ fn station(links: &[(&str, &str)]) -> Station {
     let config = StationConfig {
         station: StationId::new("home").expect("a name"),
         site: None,
+        times: mission::config::Times::default(),
         satellites: satellites.collect(),
         links: links
             .iter()
@@ -115,6 +116,7 @@ fn a_command_without_a_link_takes_the_one_that_is_up() {
         priority: 0,
         gate: Gate::Heard,
         expires_at: None,
+        when: None,
         attempts_allowed: None,
         confirmation: None,
     });

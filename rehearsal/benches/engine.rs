@@ -163,6 +163,7 @@ impl Ground {
         let config = StationConfig {
             station: StationId::new("home").expect("a legal name"),
             site: None,
+            times: mission::config::Times::default(),
             satellites: vec![SatelliteConfig {
                 id: satellite.clone(),
                 profile: Profile::default(),

@@ -113,6 +113,7 @@ impl Desk {
             priority: self.rng.random_range(-2..3),
             gate: if self.rng.random_bool(0.03) { Gate::Blind } else { Gate::Heard },
             expires_at: expires.then(|| utc.plus(self.rng.random_range(5_000_000..600_000_000))),
+            when: None,
             attempts_allowed: None,
             confirmation,
         })

@@ -3,15 +3,18 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
+use mission::plan::RunEnd;
 use mission::record::{
     CommandRecord, DownloadRecord, DownloadState, ImageRecord, LimitRecord, PassRecord, Record, SealedRecord,
 };
+use mission::run::{PlanRecord, RunRecord, RunState};
 use mission::snapshot::{
     CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot, Snapshot,
     Witness,
 };
 use mission::{
-    Batch, CommandId, DownloadId, ElementSet, FrameId, ImageId, PassId, SatelliteId, Stage, UtcUs,
+    Batch, CommandId, DownloadId, ElementSet, FrameId, ImageId, PassId, PlanId, RunId, SatelliteId, Stage,
+    UtcUs,
 };
 use protocol::{Counter, Downlink, KeyId, RequestTag};
 
@@ -44,6 +47,8 @@ pub(crate) struct Store {
     heartbeat: Option<(FrameId, UtcUs, u32)>,
     elements: Vec<ElementSet>,
     pub(crate) passes: BTreeMap<PassId, PassRecord>,
+    pub(crate) plans: BTreeMap<PlanId, PlanRecord>,
+    pub(crate) runs: BTreeMap<RunId, RunRecord>,
     /// Final stages reached, by word.
     pub(crate) finals: BTreeMap<&'static str, u64>,
     pub(crate) frames: u64,
@@ -155,6 +160,14 @@ impl Store {
                 self.last_ids.pass = self.last_ids.pass.max(pass.id.0);
                 self.passes.insert(pass.id, pass.clone());
             }
+            Record::Plan(plan) => {
+                self.last_ids.plan = self.last_ids.plan.max(plan.id.0);
+                self.plans.insert(plan.id, plan.clone());
+            }
+            Record::Run(run) => {
+                self.last_ids.run = self.last_ids.run.max(run.id.0);
+                self.runs.insert(run.id, (**run).clone());
+            }
             Record::Event(event) => {
                 self.events += 1;
                 self.bridges += u64::from(event.kind == mission::record::EventKind::Bridge);
@@ -198,6 +211,14 @@ impl Store {
                 elements: self.elements.clone(),
                 pass: self.passes.values().rev().find(|pass| pass.ended_at.is_none()).cloned(),
             }],
+            plans: self.plans.values().filter(|plan| plan.withdrawn_at.is_none()).cloned().collect(),
+            runs: {
+                let ended =
+                    self.runs.values().rev().find(|run| run.state == RunState::Ended).map(|run| run.id);
+                let later = |run: &RunRecord| run.progress.end == Some(RunEnd::Later);
+                let wanted = |run: &&RunRecord| !run.state.is_final() || later(run) || Some(run.id) == ended;
+                self.runs.values().filter(wanted).cloned().collect()
+            },
             keys: vec![KeySnapshot {
                 key,
                 counter: self.counter,

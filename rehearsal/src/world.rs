@@ -604,6 +604,7 @@ impl World {
         StationConfig {
             station: station_name(),
             site: self.site(),
+            times: mission::config::Times::default(),
             satellites: vec![SatelliteConfig {
                 id: self.satellite.clone(),
                 profile: Profile {

@@ -31,6 +31,7 @@ impl Config {
     pub fn check(&self) -> Result<(), ConfigError> {
         name("station.name".into(), StationId::new(&self.station.name).map(drop))?;
         self.station.site()?;
+        self.station.times()?;
         ensure(!self.satellites.is_empty(), "satellites", "there is none", "Add a [[satellites]] section.")?;
         ensure(!self.links.is_empty(), "links", "there is none", "Add a [[links]] section.")?;
         ensure(

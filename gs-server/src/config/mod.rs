@@ -47,7 +47,9 @@ pub use error::ConfigError;
 pub use links::{AuxInput, LinkKind, LinkSection, ModePinWiring, Phy, UsbId};
 pub use reload::Changes;
 pub use satellites::{CounterSetting, LimitSection, SatelliteSection, Thresholds};
-pub use server::{ClockSetting, HttpSection, LogSection, SimulationSection, StationSection, StorageSection};
+pub use server::{
+    ClockSetting, HttpSection, LogSection, SimulationSection, StationSection, StorageSection, WindowSection,
+};
 pub use station::{driver_config, station_config};
 
 /// Everything that `serve` must know.

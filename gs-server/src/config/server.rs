@@ -3,7 +3,9 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-use mission::Site;
+use mission::config::Times;
+use mission::schedule::Window;
+use mission::{Site, UtcUs};
 use serde::Deserialize;
 use tle::station::StationError;
 use tle::{EarthOrientation, HorizonMask, Station};
@@ -37,9 +39,65 @@ pub struct StationSection {
     /// UT1-UTC, seconds (IERS Bulletin A). Default 0; 0.1 s is worth 46 m at the equator.
     #[serde(default)]
     pub dut1_s: f64,
+    /// The station transmits within these windows only. Default: always.
+    #[serde(default)]
+    pub licence: Option<Vec<WindowSection>>,
+    /// Nothing is planned in these windows.
+    #[serde(default)]
+    pub blackouts: Vec<WindowSection>,
+    /// What the antenna needs from one satellite to the next, seconds. Default 30.
+    #[serde(default = "half_a_minute")]
+    pub switch_over_s: u32,
+}
+
+const fn half_a_minute() -> u32 {
+    30
+}
+
+/// A stretch of time in the configuration.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WindowSection {
+    /// Its begin, RFC 3339.
+    pub start: api::Time,
+    /// Its end, RFC 3339.
+    pub stop: api::Time,
+    /// Why, in an operator's words.
+    #[serde(default)]
+    pub reason: String,
+}
+
+impl WindowSection {
+    fn window(&self, key: &str) -> Result<Window, ConfigError> {
+        let (start, stop) = (UtcUs(self.start.unix_us()), UtcUs(self.stop.unix_us()));
+        if start < stop {
+            return Ok(Window { start, stop });
+        }
+        Err(ConfigError::value(key, "it ends before it begins", "Exchange start and stop."))
+    }
 }
 
 impl StationSection {
+    /// When the station may transmit and when it is closed.
+    ///
+    /// # Errors
+    /// [`ConfigError`] that names the key.
+    pub fn times(&self) -> Result<Times, ConfigError> {
+        let licence = self.licence.as_ref().map(|windows| {
+            let one =
+                |(at, window): (usize, &WindowSection)| window.window(&format!("station.licence[{at}]"));
+            windows.iter().enumerate().map(one).collect::<Result<Vec<_>, _>>()
+        });
+        let blackout = |(at, window): (usize, &WindowSection)| {
+            Ok((window.window(&format!("station.blackouts[{at}]"))?, window.reason.clone()))
+        };
+        Ok(Times {
+            licence: licence.transpose()?,
+            blackouts: self.blackouts.iter().enumerate().map(blackout).collect::<Result<_, ConfigError>>()?,
+            switch_over_s: self.switch_over_s,
+        })
+    }
+
     /// Where the station stands and what it sees; `None` when nobody said.
     ///
     /// # Errors
@@ -67,7 +125,8 @@ impl StationSection {
         })?;
         if !self.horizon_deg.is_empty() {
             let table: Vec<(f64, f64)> = self.horizon_deg.iter().map(|[az, el]| (*az, *el)).collect();
-            let mask = HorizonMask::from_table(&table).map_err(|error| wrong("horizon_deg", error.to_string()))?;
+            let mask =
+                HorizonMask::from_table(&table).map_err(|error| wrong("horizon_deg", error.to_string()))?;
             place = place.with_mask(mask);
         }
         if !(-90.0..=90.0).contains(&self.min_elevation_deg) {

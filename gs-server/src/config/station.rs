@@ -53,6 +53,7 @@ pub fn station_config(config: &Config, keys: &BTreeMap<String, Key>) -> Result<S
         satellites,
         links,
         site: config.station.site()?,
+        times: config.station.times()?,
     })
 }
 

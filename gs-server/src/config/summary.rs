@@ -59,7 +59,11 @@ impl fmt::Display for Config {
                 f,
                 "elements from {}{}, every {} h, never within {} h",
                 source.url,
-                source.credentials_file.as_ref().map(|f| format!(", login in {}", f.display())).unwrap_or_default(),
+                source
+                    .credentials_file
+                    .as_ref()
+                    .map(|f| format!(", login in {}", f.display()))
+                    .unwrap_or_default(),
                 self.elements.every_h,
                 self.elements.min_age_h,
             )?;

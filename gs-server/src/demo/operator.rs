@@ -95,6 +95,7 @@ impl Operator {
             priority: 0,
             gate: Gate::Heard,
             expires_at: None,
+            when: None,
             attempts_allowed: None,
             confirmation,
         };

@@ -13,6 +13,7 @@ use super::App;
 use super::extract::{Id, Query, number, page, paged, satellite, scope, small, time};
 use super::problem::Failure;
 use super::write::Write;
+use crate::plan::condition_of;
 use crate::storage::{CommandQuery, CommandRow, StageRow};
 
 #[derive(Debug, Deserialize)]
@@ -80,6 +81,15 @@ fn intent(app: &App, request: &CommandRequest) -> Result<CommandIntent, Failure>
     if request.attempts == Some(0) {
         return Err(Failure::field(ProblemKind::BadArgument, "attempts", "must be at least 1, or null"));
     }
+    let when =
+        request.when.as_ref().map(|when| condition_of("when", when)).transpose().map_err(|findings| {
+            let told: Vec<String> = findings.iter().map(ToString::to_string).collect();
+            let problem = Problem::new(ProblemKind::BadArgument, told.join("; "));
+            let field = |problem: Problem, finding: &mission::plan::Finding| {
+                problem.with_field(finding.place.clone(), finding.problem.clone())
+            };
+            Failure(Box::new(findings.iter().fold(problem, field)))
+        })?;
     Ok(CommandIntent {
         satellite: satellite(app, request.satellite.as_deref())?,
         link: request.link.as_deref().map(link).transpose()?,
@@ -89,6 +99,7 @@ fn intent(app: &App, request: &CommandRequest) -> Result<CommandIntent, Failure>
             GateWord::Heard => Gate::Heard,
             GateWord::Blind => Gate::Blind,
         },
+        when: when.map(Box::new),
         expires_at: request.expires_at.map(|time| UtcUs(time.unix_us())),
         attempts_allowed: request.attempts,
         confirmation: request.confirm.clone(),

@@ -91,6 +91,11 @@ impl From<Refusal> for Failure {
             Refusal::QueueFull(_) => (ProblemKind::QueueFull, None),
             Refusal::Storage(_) => (ProblemKind::StorageFailing, None),
             Refusal::NotLocked(_) => (ProblemKind::NotLocked, None),
+            Refusal::UnknownPlan(_) => (ProblemKind::UnknownPlan, Some("plan")),
+            Refusal::Plan(_) => (ProblemKind::PlanRefused, Some("plan")),
+            Refusal::PlansFull(_) => (ProblemKind::PlansFull, None),
+            Refusal::Pass(_) => (ProblemKind::PassRefused, Some("at")),
+            Refusal::NothingRuns(_) => (ProblemKind::NothingRuns, Some("satellite")),
             Refusal::Stopping => (ProblemKind::Stopping, None),
         };
         let message = refusal.to_string();

@@ -1,6 +1,8 @@
 //! `GET /api/v1/station`: how the station is right now.
 
-use api::{ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView};
+use api::{
+    ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView,
+};
 use axum::Json;
 use axum::extract::State;
 use mission::status::{LinkStatus, SatelliteStatus, SkyStatus};

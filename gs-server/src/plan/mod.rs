@@ -20,6 +20,7 @@
 //! assert!(found.remedy.contains("Did you mean 'listen'?"));
 //! ```
 
+mod condition;
 mod place;
 mod read;
 pub mod template;
@@ -29,6 +30,7 @@ mod words;
 use api::{PlanFinding, PlanText};
 use mission::plan::{CheckContext, Finding, Plan, Severity, check};
 
+pub use condition::{condition_of, condition_text};
 pub use read::{Form, read};
 
 /// A text that was looked at.

@@ -225,7 +225,7 @@ impl Reader {
         }
     }
 
-    fn condition(&mut self, place: &str, words: &ConditionText) -> Condition {
+    pub(super) fn condition(&mut self, place: &str, words: &ConditionText) -> Condition {
         let mut us = |field: &str, s: Option<f64>| self.maybe_us(&format!("{place}.{field}"), s);
         let heard_within_us = us("heard_within_s", words.heard_within_s);
         let after_aos_us = us("after_aos_s", words.after_aos_s);

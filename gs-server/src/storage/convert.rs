@@ -150,6 +150,8 @@ impl CommandRow {
             attempts_allowed: narrow("commands.attempts_allowed", self.attempts_allowed)?,
             created_at: UtcUs(self.created_at_us),
             expires_at: self.expires_at_us.map(UtcUs),
+            // It stands beside, in a table of its own.
+            when: None,
         })
     }
 }

@@ -13,10 +13,12 @@
 //! What it does **not** do: keep keys, know HTTP, delete anything that was heard or sent.
 
 mod convert;
+mod convert_plan;
 mod convert_sky;
 mod error;
 mod lock;
 mod open;
+mod progress;
 mod read;
 mod redecode;
 pub mod reserve;
@@ -46,8 +48,9 @@ pub use read::{
 };
 pub use redecode::{RedecodeProgress, RedecodeReport};
 pub use rows::{
-    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow, FrameRow,
-    ImageRow, IntentRow, LimitRow, MetaRow, ParameterRow, PassElementsRow, PassRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
+    AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow,
+    FrameRow, ImageRow, IntentRow, LimitRow, MetaRow, ParameterRow, PassElementsRow, PassRow, PlanRow,
+    ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 
 use reserve::{Reserve, ReserveError};

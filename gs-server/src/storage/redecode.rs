@@ -9,8 +9,9 @@ use sqlx::Row as _;
 
 use super::row::{Row, select};
 use super::rows::{
-    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, EventRow, FrameRow, ImageRow, IntentRow,
-    LimitRow, ParameterRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
+    AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow,
+    FrameRow, ImageRow, IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, PlanRow, ReceptionRow,
+    RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::write::Transaction;
 use super::{Store, StoreError};
@@ -224,6 +225,12 @@ async fn verify_the_rest(store: &Store, report: &mut RedecodeReport) -> Result<(
     verify::<ChunkRow>(store, report).await?;
     verify::<DownloadRow>(store, report).await?;
     verify::<LimitRow>(store, report).await?;
+    verify::<ElementsRow>(store, report).await?;
+    verify::<PassRow>(store, report).await?;
+    verify::<PassElementsRow>(store, report).await?;
+    verify::<PlanRow>(store, report).await?;
+    verify::<RunRow>(store, report).await?;
+    verify::<ConditionRow>(store, report).await?;
     verify::<EventRow>(store, report).await?;
     verify::<AuditRow>(store, report).await?;
     verify::<IntentRow>(store, report).await

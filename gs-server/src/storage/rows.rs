@@ -374,6 +374,74 @@ row! {
 }
 
 row! {
+    /// A plan that was handed over.
+    PlanRow in "plans" {
+        /// Id, rising.
+        id: i64,
+        /// Its name.
+        name: String,
+        /// Whom it commands.
+        satellite: String,
+        /// The station that runs it.
+        station: String,
+        /// The plan as JSON, in the words of the API.
+        plan: String,
+        /// When it was handed over.
+        added_at_us: i64,
+        /// By whom.
+        who: String,
+        /// It may run.
+        armed: bool,
+        /// Passes that an operator chose, as a JSON array.
+        picks: String,
+        /// When it was withdrawn; `None` while it is in use.
+        withdrawn_at_us: Option<i64>,
+    }
+}
+
+row! {
+    /// A plan in one pass.
+    RunRow in "plan_runs" {
+        /// Id, rising.
+        id: i64,
+        /// Which plan.
+        plan: i64,
+        /// Whom it commands.
+        satellite: String,
+        /// From which station.
+        station: String,
+        /// Over which link.
+        link: Option<String>,
+        /// The pass, once it began.
+        pass: Option<i64>,
+        /// Begin of the contact.
+        aos_at_us: i64,
+        /// Its end.
+        los_at_us: i64,
+        /// How it stands.
+        state: String,
+        /// Why, where there is a why.
+        why: Option<String>,
+        /// How far it has come, as JSON.
+        progress: String,
+        /// How it ended.
+        outcome: Option<String>,
+        /// When it was last changed.
+        at_us: i64,
+    }
+}
+
+row! {
+    /// What a command waits for besides contact.
+    ConditionRow in "command_conditions" {
+        /// Which command.
+        command: i64,
+        /// The condition as JSON, in the words of the API.
+        condition: String,
+    }
+}
+
+row! {
     /// Elements that a pass used.
     PassElementsRow in "pass_elements" {
         /// Which pass.

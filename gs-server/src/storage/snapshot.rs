@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use mission::record::{CommandRecord, PassRecord};
+use mission::run::{PlanRecord, RunRecord};
+use mission::sky::SETS_KEPT;
 use mission::snapshot::{
     CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot, Snapshot,
     Witness,
 };
-use mission::record::PassRecord;
-use mission::sky::SETS_KEPT;
 use mission::{ElementSet, FrameId, SatelliteId, Stage, UtcUs};
 use protocol::{Counter, DownFrame, Downlink, KeyId, RequestTag, down_type};
 use sqlx::{Row as _, SqliteConnection};
@@ -15,8 +16,8 @@ use sqlx::{Row as _, SqliteConnection};
 use super::convert::{exactly, int, narrow, parse};
 use super::row::{Row as _, select};
 use super::rows::{
-    ChunkRow, CommandRow, DownloadRow, ElementsRow, FrameRow, ImageRow, LimitRow, PassElementsRow, PassRow,
-    SealedRow, StageRow,
+    ChunkRow, CommandRow, ConditionRow, DownloadRow, ElementsRow, FrameRow, ImageRow, LimitRow,
+    PassElementsRow, PassRow, PlanRow, RunRow, SealedRow, StageRow,
 };
 use super::{Store, StoreError, off_the_loop};
 
@@ -40,6 +41,8 @@ pub(super) async fn snapshot(
             snapshot.satellites.push(left);
         }
     }
+    snapshot.plans = plans(connection).await?;
+    snapshot.runs = runs(connection).await?;
     let folder = store.0.witness.clone();
     let asked = keys.to_vec();
     let witnesses: Vec<Witness> =
@@ -68,7 +71,9 @@ async fn last_ids(connection: &mut SqliteConnection) -> Result<LastIds, StoreErr
                 (select coalesce(max(id), 0) from images) as image,
                 (select coalesce(max(id), 0) from downloads) as download,
                 (select coalesce(max(id), 0) from elements) as elements,
-                (select coalesce(max(id), 0) from passes) as pass",
+                (select coalesce(max(id), 0) from passes) as pass,
+                (select coalesce(max(id), 0) from plans) as plan,
+                (select coalesce(max(id), 0) from plan_runs) as run",
     )
     .fetch_one(connection)
     .await?;
@@ -79,6 +84,8 @@ async fn last_ids(connection: &mut SqliteConnection) -> Result<LastIds, StoreErr
         download: narrow("downloads.id", row.try_get("download")?)?,
         elements: narrow("elements.id", row.try_get("elements")?)?,
         pass: narrow("passes.id", row.try_get("pass")?)?,
+        plan: narrow("plans.id", row.try_get("plan")?)?,
+        run: narrow("plan_runs.id", row.try_get("run")?)?,
     })
 }
 
@@ -114,16 +121,38 @@ async fn of_satellite(
     })
 }
 
+async fn plans(connection: &mut SqliteConnection) -> Result<Vec<PlanRecord>, StoreError> {
+    let rows = sqlx::query(select::<PlanRow>("where withdrawn_at_us is null order by id"))
+        .fetch_all(connection)
+        .await?;
+    rows.iter().map(|row| PlanRow::read(row)?.record()).collect()
+}
+
+/// What is not over, of each plan the newest if the next pass is to finish it, and of each satellite the newest that ended.
+async fn runs(connection: &mut SqliteConnection) -> Result<Vec<RunRecord>, StoreError> {
+    let rows = sqlx::query(select::<RunRow>(
+        "where state in ('planned', 'waiting', 'running', 'held')
+            or id in (select max(id) from plan_runs where state = 'ended' group by satellite)
+            or (outcome = 'later'
+                and id in (select max(id) from plan_runs where state = 'ended' group by plan))
+         order by id",
+    ))
+    .fetch_all(connection)
+    .await?;
+    rows.iter().map(|row| RunRow::read(row)?.record()).collect()
+}
+
 /// The newest sets by epoch.
 async fn elements(
     connection: &mut SqliteConnection,
     satellite: &SatelliteId,
 ) -> Result<Vec<ElementSet>, StoreError> {
-    let rows = sqlx::query(select::<ElementsRow>("where satellite = ? order by epoch_us desc, id desc limit ?"))
-        .bind(satellite.as_str())
-        .bind(int("limit", SETS_KEPT as u64)?)
-        .fetch_all(connection)
-        .await?;
+    let rows =
+        sqlx::query(select::<ElementsRow>("where satellite = ? order by epoch_us desc, id desc limit ?"))
+            .bind(satellite.as_str())
+            .bind(int("limit", SETS_KEPT as u64)?)
+            .fetch_all(connection)
+            .await?;
     rows.iter().map(|row| ElementsRow::read(row)?.set()).collect()
 }
 
@@ -132,10 +161,12 @@ async fn pass(
     connection: &mut SqliteConnection,
     satellite: &SatelliteId,
 ) -> Result<Option<PassRecord>, StoreError> {
-    let row = sqlx::query(select::<PassRow>("where satellite = ? and ended_at_us is null order by id desc limit 1"))
-        .bind(satellite.as_str())
-        .fetch_optional(&mut *connection)
-        .await?;
+    let row = sqlx::query(select::<PassRow>(
+        "where satellite = ? and ended_at_us is null order by id desc limit 1",
+    ))
+    .bind(satellite.as_str())
+    .fetch_optional(&mut *connection)
+    .await?;
     let Some(row) = row else { return Ok(None) };
     let pass = PassRow::read(&row)?;
     let used = sqlx::query(select::<PassElementsRow>("where pass = ? order by id"))
@@ -212,8 +243,13 @@ async fn command(connection: &mut SqliteConnection, row: &CommandRow) -> Result<
     .bind(row.id)
     .fetch_one(&mut *connection)
     .await?;
+    let condition = sqlx::query(select::<ConditionRow>("where command = ?"))
+        .bind(row.id)
+        .fetch_optional(&mut *connection)
+        .await?;
+    let when = condition.as_ref().map(|row| ConditionRow::read(row)?.condition()).transpose()?;
     Ok(CommandSnapshot {
-        record: row.record()?,
+        record: CommandRecord { when: when.map(Box::new), ..row.record()? },
         stage,
         stage_at,
         attempt,

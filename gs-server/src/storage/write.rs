@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use mission::record::{
-    AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, PassRecord, ReceptionRssi,
-    Record, Route, StageRecord, TelemetryRecord,
+    AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, PassRecord,
+    ReceptionRssi, Record, Route, StageRecord, TelemetryRecord,
 };
 use mission::{Batch, StationId};
 use sqlx::sqlite::SqliteConnectOptions;
@@ -13,8 +13,9 @@ use sqlx::{AssertSqlSafe, Connection as _, Row as _, SqliteConnection};
 use super::convert::{int, route};
 use super::row::{Row, select, upsert};
 use super::rows::{
-    AuditRow, ChunkRow, CommandRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow, FrameRow, ImageRow,
-    IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, ReceptionRow, RouteRow, SealedRow, StageRow, TelemetryRow,
+    AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow,
+    FrameRow, ImageRow, IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, PlanRow, ReceptionRow,
+    RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::{StoreError, StoredEvent};
 
@@ -197,7 +198,12 @@ impl Transaction<'_> {
             Record::Reception(reception) => self.insert(&ReceptionRow::of(reception)?).await?,
             Record::ReceptionRssi(rssi) => self.set_rssi(rssi).await?,
             Record::Telemetry(telemetry) => self.telemetry(telemetry).await?,
-            Record::Command(command) => self.insert(&CommandRow::of(command)?).await?,
+            Record::Command(command) => {
+                self.insert(&CommandRow::of(command)?).await?;
+                if let Some(condition) = ConditionRow::of(command)? {
+                    self.insert(&condition).await?;
+                }
+            }
             Record::Stage(stage) => self.stage(stage, batch).await?,
             Record::Sealed(sealed) => self.insert(&SealedRow::of(sealed)?).await?,
             Record::CounterFloor(floor) => self.counter_floor(floor).await?,
@@ -207,6 +213,8 @@ impl Transaction<'_> {
             Record::Limit(limit) => self.limit(limit).await?,
             Record::Elements(set) => self.insert(&ElementsRow::of(set)?).await?,
             Record::Pass(pass) => self.pass(pass).await?,
+            Record::Plan(plan) => self.upsert("id", &PlanRow::of(plan)?).await?,
+            Record::Run(run) => self.upsert("id", &RunRow::of(run)?).await?,
             Record::Event(event) => return self.event(event).await.map(Some),
             Record::Audit(audit) => self.audit(audit).await?,
             Record::Intent(receipt) => self.insert(&IntentRow::of(receipt, self.station)?).await?,

@@ -91,6 +91,7 @@ pub(crate) fn ping() -> Intent {
         link: None,
         telecommand: Telecommand::Ping,
         priority: 0,
+        when: None,
         gate: Gate::Heard,
         expires_at: None,
         attempts_allowed: None,

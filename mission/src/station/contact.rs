@@ -118,6 +118,11 @@ impl Contact {
         self.view.flatten().flatten()
     }
 
+    /// How long ago a frame was received in this life, microseconds.
+    pub(super) fn heard_ago_us(&self, now: MonoUs) -> Option<u64> {
+        self.heard.map(|heard| now.since(heard.mono))
+    }
+
     pub(super) fn heard_at(&self) -> Option<UtcUs> {
         self.heard.map(|now| now.utc)
     }

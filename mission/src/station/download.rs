@@ -143,6 +143,7 @@ impl Station {
             attempts_allowed: 1,
             created_at: now.utc,
             expires_at: None,
+            when: None,
         };
         let about = About {
             route: Some(record.route.clone()),
@@ -247,6 +248,9 @@ impl Station {
     pub(super) fn end_download(&mut self, now: Now, s: usize, state: DownloadState, why: &str) {
         let Some(mut download) = self.satellites[s].download.take() else { return };
         download.record.state = state;
+        for run in &mut self.runs {
+            run.note_download(download.record.id, state);
+        }
         self.journal.push(Record::Download(download.record.clone()));
         let subject = Subject {
             image: download.record.image,

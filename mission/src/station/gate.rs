@@ -57,11 +57,29 @@ impl Station {
         if self.satellites.iter().enumerate().any(|(other, sat)| other != s && sat.is_on_air_or_awaits()) {
             return Err(wait("another satellite's answer is awaited", Some(now.mono.plus(TAKE_TURNS_US))));
         }
+        self.licence_gate(now, link.config.timing.uplink_us())?;
         self.seal_gate(sat)?;
         link_gate(link, now, need.gate)?;
         contact_gate(sat, now, need.gate)?;
         silence_gate(sat, link, now)?;
         los_gate(sat, link, now, need.answer_us)
+    }
+
+    /// The licence covers the whole transmission.
+    fn licence_gate(&self, now: Now, uplink_us: u64) -> Result<(), Wait> {
+        let Some(windows) = &self.times.licence else { return Ok(()) };
+        let end = now.utc.plus(i64::try_from(uplink_us).unwrap_or(i64::MAX));
+        if windows.iter().any(|window| window.start <= now.utc && end <= window.stop) {
+            return Ok(());
+        }
+        let next = windows.iter().map(|window| window.start).filter(|start| *start > now.utc).min();
+        match next {
+            Some(start) => {
+                let why = format!("the licence allows no transmission until {}", clock_time(start, now.utc));
+                Err(Wait { why: why.into(), until: Some(mono_of(now, start)) })
+            }
+            None => Err(wait("the licence allows no transmission any more", None)),
+        }
     }
 
     fn seal_gate(&self, sat: &Satellite) -> Result<(), Wait> {

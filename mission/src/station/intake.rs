@@ -267,6 +267,7 @@ impl Station {
         if !points.is_empty() && !heard.repeat {
             if heard.live {
                 self.limits(heard, &points);
+                self.note_readings(heard, &points);
             }
             self.journal.push(Record::Telemetry(TelemetryRecord {
                 frame: heard.id,

@@ -77,6 +77,11 @@ impl Station {
             Intent::AddElements { satellite, elements, source } => {
                 self.add_elements(now, who, &satellite, elements, &source)
             }
+            Intent::AddPlan { plan, text } => self.add_plan(now, who, plan, text),
+            Intent::WithdrawPlan(plan) => self.withdraw_plan(now, who, &plan),
+            Intent::ArmPlan { plan, armed } => self.arm_plan(now, who, &plan, armed),
+            Intent::AttachPlan { plan, at, attach } => self.attach_plan(now, who, &plan, at, attach),
+            Intent::TakeOver { satellite, held } => self.take_over(now, who, &satellite, held),
             Intent::ArmLink { link, armed } => {
                 let l = self.link_index(&link).ok_or_else(|| Refusal::UnknownLink(link.to_string()))?;
                 if armed && self.links[l].config.receive_only {
@@ -121,7 +126,7 @@ impl Station {
         Ok((s, l))
     }
 
-    fn command_intent(
+    pub(super) fn command_intent(
         &mut self,
         now: Now,
         who: &Principal,
@@ -183,6 +188,7 @@ impl Station {
             attempts_allowed: allowed,
             created_at: now.utc,
             expires_at: wanted.expires_at,
+            when: wanted.when.filter(|when| !when.is_empty()),
         };
         self.audit(now.utc, who, "command.create", format!("command {id}: {}", record.telecommand));
         self.add_command(now, s, record, &format!("{who} wants it"));
@@ -190,6 +196,16 @@ impl Station {
     }
 
     fn cancel(&mut self, now: Now, who: &Principal, id: CommandId) -> Result<Accepted, Refusal> {
+        self.cancel_because(now, who, id, &format!("{who} withdrew it"))
+    }
+
+    pub(super) fn cancel_because(
+        &mut self,
+        now: Now,
+        who: &Principal,
+        id: CommandId,
+        why: &str,
+    ) -> Result<Accepted, Refusal> {
         let found = self.satellites.iter().position(|sat| sat.commands.contains_key(&id));
         let s = found.ok_or(Refusal::UnknownCommand(id))?;
         let sat = &mut self.satellites[s];
@@ -212,11 +228,11 @@ impl Station {
             _ => return Err(too_late),
         }
         self.audit(now.utc, who, "command.cancel", format!("command {id}"));
-        self.give_up(now, s, id, Stage::Cancelled, who, &format!("{who} withdrew it"));
+        self.give_up(now, s, id, Stage::Cancelled, who, why);
         Ok(Accepted::Cancelled(id))
     }
 
-    fn download_intent(
+    pub(super) fn download_intent(
         &mut self,
         now: Now,
         who: &Principal,
@@ -255,7 +271,12 @@ impl Station {
         Ok(Accepted::Download(id))
     }
 
-    fn cancel_download(&mut self, now: Now, who: &Principal, id: DownloadId) -> Result<Accepted, Refusal> {
+    pub(super) fn cancel_download(
+        &mut self,
+        now: Now,
+        who: &Principal,
+        id: DownloadId,
+    ) -> Result<Accepted, Refusal> {
         let is_it = |d: &Download| d.record.id == id;
         let found = self.satellites.iter().position(|sat| sat.download.as_ref().is_some_and(is_it));
         let s = found.ok_or(Refusal::UnknownDownload(id))?;

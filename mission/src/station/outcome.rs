@@ -79,6 +79,9 @@ impl Station {
             sat.commands.remove(&id);
         }
         self.journal.push(Record::Stage(record));
+        for run in &mut self.runs {
+            run.note_stage(id, stage);
+        }
         let level = match stage {
             Stage::Failed | Stage::Rejected => Level::Warning,
             Stage::Unknown | Stage::Expired => Level::Watch,

@@ -1,12 +1,15 @@
 //! How a new life begins: from what was stored, and honestly about what was not.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
+use super::agenda::{Agenda, is_unfinished};
 use super::contact::Contact;
 use super::image::Assembly;
 use super::journal::Journal;
 use super::link::Link;
 use super::outcome::mono_of;
+use super::runner::Run;
 use super::satellite::{Before, Command, Download, Exchange, Satellite, Settling};
 use super::sealing::Sealer;
 use super::sky::Sky;
@@ -18,6 +21,7 @@ use crate::level::Level;
 use crate::limits::LimitState;
 use crate::port::Effect;
 use crate::record::EventKind;
+use crate::run::RunState;
 use crate::snapshot::{CommandSnapshot, SatelliteSnapshot, Snapshot};
 use crate::stage::Stage;
 
@@ -48,6 +52,7 @@ pub(super) fn station(
         })
         .collect();
     let mut station = Station {
+        antenna: Agenda::antenna(&config.station),
         station: config.station,
         me: Principal::engine(),
         entropy,
@@ -56,6 +61,18 @@ pub(super) fn station(
         satellites,
         links,
         site: config.site,
+        times: config.times,
+        antenna_fault: None,
+        runs: runs(&snapshot),
+        unfinished: snapshot.runs.iter().filter(|run| is_unfinished(&run.progress)).cloned().collect(),
+        last_ends: snapshot
+            .runs
+            .iter()
+            .filter(|run| run.state == RunState::Ended)
+            .map(|run| (run.satellite.clone(), run.los_at))
+            .collect(),
+        agenda: Agenda::stale(),
+        plans: snapshot.plans,
         ids: snapshot.last_ids,
         last_tx: 0,
         recent: VecDeque::new(),
@@ -66,6 +83,16 @@ pub(super) fn station(
     };
     station.begin_life(now);
     station
+}
+
+/// The runs that were not over, with their plans.
+fn runs(snapshot: &Snapshot) -> Vec<Run> {
+    let open = snapshot.runs.iter().filter(|run| !run.state.is_final());
+    open.filter_map(|run| {
+        let held = snapshot.plans.iter().find(|held| held.id == run.plan)?;
+        Some(Run::new(run.clone(), Arc::clone(&held.plan)))
+    })
+    .collect()
 }
 
 fn satellite(
@@ -121,6 +148,7 @@ fn satellite(
         download,
         last_tag: left.and_then(|l| l.last_tag),
         uptime: left.and_then(|l| l.heartbeat).map(|(_, at, uptime)| (at, uptime)),
+        readings: BTreeMap::new(),
         sky: Sky::restore(left),
         note: "starting".to_owned(),
         wake: None,
@@ -163,6 +191,7 @@ impl Station {
                 self.take_up(now, s, id);
             }
         }
+        self.take_up_runs(now);
         self.journal.flush(now.mono, &mut self.effects);
     }
 

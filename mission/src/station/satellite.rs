@@ -197,6 +197,8 @@ pub(super) struct Satellite {
     pub(super) last_tag: Option<RequestTag>,
     /// Of the newest heartbeat: when it was heard, uptime in ms.
     pub(super) uptime: Option<(UtcUs, u32)>,
+    /// The newest value of each parameter that was received live, and when.
+    pub(super) readings: BTreeMap<String, (Option<f64>, MonoUs)>,
     /// Its elements and passes.
     pub(super) sky: Sky,
     /// What the uplink is doing, for people.

@@ -14,10 +14,11 @@ use crate::clock::{Now, UtcUs};
 use crate::id::{ElementsId, PassId, Principal, SatelliteId};
 use crate::intent::{Accepted, Refusal};
 use crate::level::Level;
+use crate::plan::{NoMatch, PassFacts, Plan};
 use crate::record::{ElementsRecord, EventKind, PASS_ELEMENTS_MAX, PassRecord, Record, Route};
 use crate::sky::{
-    AHEAD_US, ElementSet, ElementsAge, PASSES_TOLD, PassAhead, SETS_AT_ONCE, SETS_KEPT, best_set, clock_time,
-    passes_of,
+    AHEAD_US, ElementSet, ElementsAge, PASSES_TOLD, PassAhead, SETS_AT_ONCE, SETS_KEPT, Site, best_set,
+    clock_time, instant, passes_of, sunlit_at,
 };
 use crate::snapshot::SatelliteSnapshot;
 use crate::status::SkyStatus;
@@ -26,6 +27,8 @@ use crate::status::SkyStatus;
 const OVERDUE_PERIODS: i64 = 2;
 /// Nobody is surprised to hear nothing in a pass that stays lower, degrees.
 const HEARD_FROM_DEG: f64 = 10.0;
+/// Microseconds in a day.
+const DAY_US: i64 = 86_400_000_000;
 /// The age of elements is looked at this often.
 const AGE_LOOK_US: i64 = 3_600_000_000;
 
@@ -39,6 +42,9 @@ pub(super) struct Sky {
     passes: VecDeque<PassAhead>,
     /// Passes are known from here to there; `None`: they are to be sought.
     known: Option<(UtcUs, UtcUs)>,
+    /// Rises with each search.
+    revision: u64,
+    propagator: Option<tle::Propagator>,
     fault: Option<String>,
     level: Level,
     /// Whose age was looked at last, and when.
@@ -67,6 +73,80 @@ impl Sky {
     /// When the next pass begins; `None` when one lasts or none is known.
     pub(super) fn next_aos(&self, at: UtcUs) -> Option<UtcUs> {
         self.passes.front().filter(|pass| !pass.lasts_at(at)).map(|pass| pass.aos_at)
+    }
+
+    /// The pass that lasts, and those to come.
+    pub(super) fn passes_ahead(&self) -> impl Iterator<Item = &PassAhead> {
+        self.passes.iter()
+    }
+
+    /// The number of the pass that lasts.
+    pub(super) fn open_pass(&self) -> Option<PassId> {
+        self.open.as_ref().map(|pass| pass.id)
+    }
+
+    /// Rises whenever passes were sought anew.
+    pub(super) fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// Nothing is known of passes.
+    pub(super) fn is_blind(&self) -> bool {
+        self.used.is_none() || self.fault.is_some()
+    }
+
+    /// Passes around this instant are known, if there are any.
+    pub(super) fn knows(&self, at: UtcUs) -> bool {
+        self.known.is_some_and(|(from, until)| from <= at && at < until)
+    }
+
+    /// It is in view at this instant.
+    pub(super) fn covers(&self, at: UtcUs) -> bool {
+        self.passes.iter().any(|pass| pass.lasts_at(at))
+    }
+
+    /// How high it stands over the station, degrees.
+    pub(super) fn elevation_deg(&self, site: &Site, at: UtcUs) -> Option<f64> {
+        let at = instant(at);
+        let state = self.propagator.as_ref()?.at(at).ok()?;
+        let object = tle::ecef_from_teme(&state, tle::gmst_rad(at, site.orientation));
+        Some(site.place.look(&object).elevation_deg)
+    }
+
+    /// What a plan's least pass looks at.
+    pub(super) fn facts(&self, id: &SatelliteId, pass: &PassAhead) -> Option<PassFacts> {
+        let los = pass.los_at?;
+        Some(PassFacts {
+            satellite: id.clone(),
+            tca: pass.tca_at,
+            max_elevation_deg: pass.max_elevation_deg,
+            duration_us: u64::try_from(los.0.saturating_sub(pass.aos_at.0)).unwrap_or(0),
+            sunlit: self.propagator.as_ref().and_then(|orbit| sunlit_at(orbit, pass.tca_at)),
+            matched_before: 0,
+        })
+    }
+
+    /// What a plan's rule looks at. Where only every so many-th pass is wanted, the passes of a UTC day are counted from
+    /// its midnight.
+    pub(super) fn facts_for(
+        &self,
+        id: &SatelliteId,
+        pass: &PassAhead,
+        plan: &Plan,
+        site: &Site,
+    ) -> Option<PassFacts> {
+        let facts = self.facts(id, pass)?;
+        if plan.attach.as_ref().is_none_or(|rule| rule.every <= 1) {
+            return Some(facts);
+        }
+        let set = self.sets.iter().find(|set| Some(set.id) == self.used)?;
+        let midnight = UtcUs(pass.tca_at.0 - pass.tca_at.0.rem_euclid(DAY_US));
+        let earlier = passes_of(set, site, midnight, pass.tca_at).ok()?;
+        let before = earlier.iter().filter(|other| other.tca_at >= midnight && other.tca_at < pass.tca_at);
+        let matched = before.filter_map(|other| self.facts(id, other)).filter(|facts| {
+            !matches!(plan.attaches_to(facts), Err(found) if !matches!(found, NoMatch::NotItsTurn { .. }))
+        });
+        Some(PassFacts { matched_before: matched.count() as u64, ..facts })
     }
 
     pub(super) fn status(&self, now: UtcUs) -> Option<SkyStatus> {
@@ -207,6 +287,8 @@ impl Station {
             sky.used = Some(best.id);
             sky.known = Some((now.utc, until));
             sky.passes.clear();
+            sky.revision += 1;
+            sky.propagator = tle::Propagator::new(&best.elements).ok();
             let before = sky.fault.take();
             match passes_of(&best, site, now.utc, until) {
                 Ok(passes) => sky.passes = passes.into(),
@@ -221,6 +303,7 @@ impl Station {
         let sky = &mut self.satellites[s].sky;
         while sky.passes.front().is_some_and(|pass| pass.is_over_at(now.utc)) {
             sky.passes.pop_front();
+            sky.revision += 1;
         }
         let age = ElementsAge::at(&best.elements, now.utc);
         self.note_age(now, s, best.id, age);

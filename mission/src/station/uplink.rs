@@ -80,7 +80,19 @@ impl Station {
             return false;
         }
         let mut first_wait: Option<Wait> = None;
+        // What waits for conditions of its own holds up nothing else.
+        let mut held_back: Option<Wait> = None;
         for id in self.satellites[s].queue() {
+            if let Err(wait) = self.condition_gate(now, s, id) {
+                if self.satellites[s].commands.get(&id).is_some_and(|c| c.stage == Stage::Sealed) {
+                    self.unseal(now, s, id, "its conditions do not hold any more");
+                }
+                if let Some(at) = wait.until {
+                    self.satellites[s].wake_at(at);
+                }
+                held_back.get_or_insert(wait);
+                continue;
+            }
             match self.try_command(now, s, id) {
                 Ok(()) => return true,
                 Err(wait) => {
@@ -108,7 +120,7 @@ impl Station {
             }
         }
         self.satellites[s].note =
-            first_wait.map_or_else(|| "nothing to send".to_owned(), |w| w.why.into_owned());
+            first_wait.or(held_back).map_or_else(|| "nothing to send".to_owned(), |w| w.why.into_owned());
         false
     }
 

@@ -1,10 +1,15 @@
 //! The station as watchers see it.
 
+use std::sync::Arc;
+
 use super::{About, Station};
 use crate::clock::{Now, UtcUs};
 use crate::level::Level;
 use crate::record::EventKind;
-use crate::status::{ImageStatus, LinkStatus, SatelliteStatus, SealingStatus, Status};
+use crate::run::PlanRecord;
+use crate::status::{
+    AntennaStatus, ImageStatus, LinkStatus, PlanStatus, SatelliteStatus, SealingStatus, Status,
+};
 
 impl Station {
     /// Says so when the satellite comes into contact or is lost.
@@ -82,6 +87,21 @@ impl Station {
             satellites: satellites.collect(),
             sealing: sealing.collect(),
             storage: self.journal.status(),
+            plans: self.plans.iter().map(plan_status).collect(),
+            schedule: Arc::clone(&self.agenda.schedule),
+            runs: self.runs.iter().map(|run| run.record.clone()).collect(),
+            antenna: self.antenna_fault.clone().map(|fault| AntennaStatus { fault }),
         }
+    }
+}
+
+fn plan_status(held: &PlanRecord) -> PlanStatus {
+    PlanStatus {
+        id: held.id,
+        plan: Arc::clone(&held.plan),
+        armed: held.armed,
+        picks: held.picks.clone(),
+        who: held.who.clone(),
+        added_at: held.added_at,
     }
 }

@@ -15,6 +15,7 @@ mod gates;
 mod images;
 mod locks;
 mod order;
+mod plans;
 mod restarts;
 mod sky;
 mod storage;

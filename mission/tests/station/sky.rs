@@ -13,7 +13,7 @@ use crate::world::{S, Setup, UTC0, World};
 const DAY: u64 = 86_400 * S;
 
 /// A CubeSat at about 510 km, sun-synchronous; `shift_deg` moves it along its orbit.
-fn elements(epoch_us: i64, shift_deg: f64) -> Elements {
+pub(crate) fn elements(epoch_us: i64, shift_deg: f64) -> Elements {
     Elements {
         name: Some("PIXELSAT".to_owned()),
         object_id: None,
@@ -36,7 +36,7 @@ fn elements(epoch_us: i64, shift_deg: f64) -> Elements {
     }
 }
 
-fn site() -> Site {
+pub(crate) fn site() -> Site {
     Site {
         place: tle::Station::new(48.2, 16.4, 200.0).unwrap(),
         min_elevation_deg: 0.0,
@@ -48,13 +48,13 @@ fn world() -> World {
     World::new(Setup { site: Some(site()), ..Setup::default() })
 }
 
-fn add(world: &mut World, sets: Vec<Elements>) -> Result<mission::Accepted, Refusal> {
+pub(crate) fn add(world: &mut World, sets: Vec<Elements>) -> Result<mission::Accepted, Refusal> {
     let satellite = world.satellite.clone();
     let id = world.want(Intent::AddElements { satellite, elements: sets, source: "a test".to_owned() });
     world.reply(id).unwrap().clone()
 }
 
-fn expected(set: &Elements, id: u64, days: i64) -> Vec<PassAhead> {
+pub(crate) fn expected(set: &Elements, id: u64, days: i64) -> Vec<PassAhead> {
     let set = ElementSet { id: ElementsId(id), elements: std::sync::Arc::new(set.clone()) };
     passes_of(&set, &site(), UtcUs(UTC0), UtcUs(UTC0 + days * 86_400_000_000)).unwrap()
 }

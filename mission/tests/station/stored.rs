@@ -22,11 +22,23 @@ impl World {
         let mut downloads: Vec<DownloadRecord> = Vec::new();
         let mut elements = Vec::new();
         let mut pass: Option<PassRecord> = None;
+        let mut plans: Vec<mission::run::PlanRecord> = Vec::new();
+        let mut runs: Vec<mission::run::RunRecord> = Vec::new();
         for record in &self.stored {
             match record {
                 Record::Elements(row) => {
                     ids.elements = row.id.0;
                     elements.push(ElementSet { id: row.id, elements: Arc::clone(&row.elements) });
+                }
+                Record::Plan(row) => {
+                    ids.plan = ids.plan.max(row.id.0);
+                    plans.retain(|found| found.id != row.id);
+                    plans.push(row.clone());
+                }
+                Record::Run(row) => {
+                    ids.run = ids.run.max(row.id.0);
+                    runs.retain(|found| found.id != row.id);
+                    runs.push((**row).clone());
                 }
                 Record::Pass(row) => {
                     ids.pass = row.id.0;
@@ -93,6 +105,16 @@ impl World {
                 elements,
                 pass: pass.filter(|pass| pass.ended_at.is_none()),
             }],
+            plans: plans.into_iter().filter(|plan| plan.withdrawn_at.is_none()).collect(),
+            runs: {
+                let ended = runs.iter().filter(|run| run.state == mission::run::RunState::Ended);
+                let newest = ended.map(|run| run.id).max();
+                let wanted = |run: &mission::run::RunRecord| {
+                    !run.state.is_final() || is_later(run) || Some(run.id) == newest
+                };
+                runs.sort_by_key(|run| run.id);
+                runs.into_iter().filter(wanted).collect()
+            },
             keys: vec![KeySnapshot { key: self.key(), counter, witness: self.witness.clone() }],
         }
     }
@@ -107,4 +129,8 @@ fn fresh(row: &CommandRecord) -> CommandSnapshot {
         on_air_at: None,
         sealed: None,
     }
+}
+
+fn is_later(run: &mission::run::RunRecord) -> bool {
+    run.progress.end == Some(mission::plan::RunEnd::Later)
 }

@@ -46,12 +46,20 @@ pub(crate) struct Setup {
     pub(crate) second_satellite: bool,
     pub(crate) key: [u8; 16],
     pub(crate) site: Option<mission::Site>,
+    pub(crate) times: mission::config::Times,
 }
 
 impl Default for Setup {
     fn default() -> Self {
         let profile = Profile { rssi: false, ..Profile::default() };
-        Self { profile, limits: Vec::new(), second_satellite: false, key: [7; 16], site: None }
+        Self {
+            profile,
+            limits: Vec::new(),
+            second_satellite: false,
+            key: [7; 16],
+            site: None,
+            times: mission::config::Times::default(),
+        }
     }
 }
 
@@ -96,7 +104,13 @@ fn config(setup: &Setup) -> StationConfig {
         satellites.push(satellite("pixelsat-2"));
         links.push(link("radio-2", "pixelsat-2", false));
     }
-    StationConfig { station: StationId::new("home").unwrap(), satellites, links, site: setup.site.clone() }
+    StationConfig {
+        station: StationId::new("home").unwrap(),
+        satellites,
+        links,
+        site: setup.site.clone(),
+        times: setup.times.clone(),
+    }
 }
 
 impl World {
@@ -345,6 +359,7 @@ impl World {
             priority: 0,
             gate: Gate::Heard,
             expires_at: None,
+            when: None,
             attempts_allowed: None,
             confirmation,
         }

@@ -228,6 +228,7 @@ fn station() -> StationConfig {
     StationConfig {
         station: StationId::new("bench").unwrap(),
         site: None,
+        times: Default::default(),
         satellites: vec![SatelliteConfig {
             id: satellite.clone(),
             profile: Profile::default(),

@@ -6,6 +6,7 @@ mod commands;
 mod events;
 mod frames;
 mod images;
+mod plans;
 mod sky;
 mod telemetry;
 

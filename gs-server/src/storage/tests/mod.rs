@@ -5,6 +5,7 @@ mod damage;
 mod folder;
 mod full;
 mod kill;
+mod plans;
 mod records;
 mod redecode;
 mod refusals;

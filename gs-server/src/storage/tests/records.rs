@@ -136,6 +136,7 @@ pub(super) fn command(id: u64, telecommand: Telecommand) -> CommandRecord {
         attempts_allowed: 5,
         created_at: UtcUs(NOON_US + id.cast_signed()),
         expires_at: Some(UtcUs(NOON_US + 3_600_000_000)),
+        when: None,
     }
 }
 
