@@ -237,8 +237,7 @@ mod tests {
             let revolutions = newer.mean_motion_rev_day * epoch.seconds_since(newer.epoch) / 86_400.0;
             newer.mean_anomaly_deg = (newer.mean_anomaly_deg + 360.0 * revolutions).rem_euclid(360.0);
             newer.epoch = epoch;
-            let mut catalogue = Catalogue::default();
-            catalogue.objects = vec![one.clone()];
+            let mut catalogue = Catalogue { objects: vec![one.clone()], ..Catalogue::default() };
             let text = tle::formats::write(tle::formats::Form::OmmJson, &[newer]).unwrap();
             catalogue.read("newer", text.as_bytes(), Checksums::Strict).unwrap();
             assert_eq!(catalogue.objects.len(), 1);

@@ -31,6 +31,9 @@ pub(super) struct Agenda {
     skies: u64,
 }
 
+/// How a plan stands among those that want one pass: chosen by an operator, armed, priority, worth.
+type Rank = (bool, bool, i16, f64);
+
 /// A plan for a pass.
 struct Match {
     plan: Arc<Plan>,
@@ -140,7 +143,7 @@ impl Station {
     fn plan_for(&self, id: &SatelliteId, s: usize, pass: &PassAhead) -> Option<Match> {
         let site = self.site.as_ref()?;
         let sky = &self.satellites[s].sky;
-        let mut best: Option<((bool, bool, i16, f64), &PlanRecord)> = None;
+        let mut best: Option<(Rank, &PlanRecord)> = None;
         for held in self.plans.iter().filter(|held| held.plan.satellite == *id) {
             let picked = held.picks.iter().any(|pick| pass.lasts_at(*pick));
             let matches = || {
