@@ -221,7 +221,14 @@ fn walk(client: &Client, spellings: &[(String, Vec<u8>)]) {
         let asked = if whole { format!("{path}?limit=1000") } else { path };
         let answer = client.get(&asked).unwrap_or_else(|error| panic!("{asked}: {error}"));
         let needs_parameters = asked.ends_with("/telemetry");
-        assert!(answer.status < 400 || needs_parameters, "{asked}: {} {}", answer.status, answer.text());
+        // This station has no place and no elements: what is asked of the sky says so.
+        let no_sky = answer.status == 409 && answer.text().contains(":no-place");
+        assert!(
+            answer.status < 400 || needs_parameters || no_sky,
+            "{asked}: {} {}",
+            answer.status,
+            answer.text()
+        );
         let headers = format!("{:?}", answer.headers);
         assert_eq!(
             find(&answer.body, spellings).or_else(|| find(headers.as_bytes(), spellings)),

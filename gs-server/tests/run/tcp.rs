@@ -10,7 +10,7 @@ use tokio::net::TcpListener;
 
 use crate::support::{Folder, Server, heartbeat, until};
 
-const SOON: Duration = Duration::from_secs(4);
+const SOON: Duration = Duration::from_secs(20);
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_far_end_that_comes_goes_and_returns_is_heard_each_time() {

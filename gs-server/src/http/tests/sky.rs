@@ -108,10 +108,12 @@ async fn passes_agree_with_looks_at_their_ends() {
     for pass in passes {
         assert_eq!((&pass["satellite"], &pass["norad_cat_id"]), (&json!("pixelsat-1"), &json!(25_544)));
         let [aos, tca, los] = ["aos", "tca", "los"].map(|name| us(&pass[name]));
-        assert!(start.unix_us() <= aos && aos < tca && tca < los && los <= stop.unix_us());
+        assert!(start.unix_us() <= aos && aos <= tca && tca <= los && los <= stop.unix_us());
+        // Cut by the window, a pass may be at its highest where it is cut.
         if pass["aos_clipped"] == json!(true) || pass["los_clipped"] == json!(true) {
             continue;
         }
+        assert!(aos < tca && tca < los);
         assert!(number(&pass["aos_doppler_hz"]) > 0.0 && number(&pass["los_doppler_hz"]) < 0.0);
         let at = ["aos", "tca", "los"].map(|name| pass[name].as_str().unwrap()).join(",");
         let looks = bench.get(&format!("/api/v1/look?at={at}&frequency=435e6")).await.ok();
