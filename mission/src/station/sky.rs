@@ -181,10 +181,22 @@ impl Sky {
 }
 
 impl Satellite {
+    /// The pass that lasts, as far as the elements can be believed.
+    fn believed_pass(&self, at: UtcUs) -> Option<&PassAhead> {
+        self.contact.in_view()?;
+        self.sky.pass(at)
+    }
+
+    /// When the next pass begins, as far as the elements can be believed.
+    fn believed_aos(&self, at: UtcUs) -> Option<UtcUs> {
+        self.contact.in_view()?;
+        self.sky.next_aos(at)
+    }
+
     /// What may be expected of it now.
     pub(super) fn expectation(&self, now: Now) -> String {
         let due = self.overdue_us(now);
-        match (self.sky.pass(now.utc), self.contact.is_open(now.mono)) {
+        match (self.believed_pass(now.utc), self.contact.is_open(now.mono)) {
             (Some(_), _) if due.is_some() => {
                 format!("beacon overdue {} s", due.unwrap_or_default() / 1_000_000)
             }
@@ -194,7 +206,7 @@ impl Satellite {
             },
             (Some(_), false) => "in view, beacon expected".to_owned(),
             (None, true) => "in contact".to_owned(),
-            (None, false) => match self.sky.next_aos(now.utc) {
+            (None, false) => match self.believed_aos(now.utc) {
                 Some(aos) => format!("no contact expected until {}", clock_time(aos, now.utc)),
                 None if self.sky.used.is_some() && self.contact.in_view() == Some(false) => {
                     "no contact expected in the next two days".to_owned()
@@ -215,7 +227,7 @@ impl Satellite {
     /// Since when heartbeats should have been heard and were not; `None` when none is expected: not in view, or a pass so
     /// low that hearing nothing is no surprise.
     fn silent_since(&self, now: Now) -> Option<UtcUs> {
-        let pass = self.sky.pass(now.utc).filter(|pass| pass.max_elevation_deg >= HEARD_FROM_DEG)?;
+        let pass = self.believed_pass(now.utc).filter(|pass| pass.max_elevation_deg >= HEARD_FROM_DEG)?;
         // A third of the way up a usual pass has climbed above the trees.
         let up = pass.aos_at.plus(pass.tca_at.0.saturating_sub(pass.aos_at.0) / 3);
         Some(self.contact.heartbeat_at().map_or(up, |at| at.max(up)))
@@ -351,9 +363,9 @@ impl Station {
 
     /// Stores the pass that lasts, and says when one begins and ends.
     fn note_pass(&mut self, now: Now, s: usize) {
-        let sky = &self.satellites[s].sky;
-        let current = sky.pass(now.utc).copied();
-        let open = sky.open.clone();
+        let sat = &self.satellites[s];
+        let current = sat.believed_pass(now.utc).copied();
+        let open = sat.sky.open.clone();
         match (open, current) {
             (Some(open), Some(pass)) if pass.is_same_as(open.aos_at, open.los_at) => {
                 self.renew_pass(now, s, open, &pass);
@@ -417,7 +429,7 @@ impl Station {
         let sat = &mut self.satellites[s];
         sat.sky.open = None;
         let id = sat.id.clone();
-        let next = sat.sky.next_aos(now.utc);
+        let next = sat.believed_aos(now.utc);
         let next = next.map(|aos| format!("; no contact expected until {}", clock_time(aos, now.utc)));
         let message = format!("{id} is below the horizon{}", next.unwrap_or_default());
         self.sky_event(now.utc, s, EventKind::Pass, Level::Normal, message);

@@ -200,6 +200,14 @@ fn old_elements_are_told_and_in_the_end_believed_no_more() {
     assert_eq!(in_view(&world), None, "an orbit of six weeks ago is no reason to be silent");
     let told = world.events(EventKind::Elements).iter().filter(|text| text.contains("days old")).count();
     assert_eq!(told, 2, "once a level");
+    let believed = stored(&world).len();
+    for _ in 0..1440 {
+        let expected = expectation(&world);
+        assert!(expected.contains("add elements"), "useless elements tell no contact: {expected}");
+        world.pass(60 * S);
+    }
+    assert_eq!(stored(&world).len(), believed, "nor a pass");
+    assert!(stored(&world).iter().all(|pass| pass.ended_at.is_some()));
     let fresh = elements(world.now.utc.0, 0.0);
     add(&mut world, vec![fresh]).unwrap();
     assert!(in_view(&world).is_some());
