@@ -48,11 +48,12 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// What to call the object: its name, else its catalogue number, else its designator.
+    /// What to call the object: its name, else its catalogue number, else its designator. Control characters, with which
+    /// a name could write anything on a terminal, are left out.
     #[must_use]
     pub fn label(&self) -> String {
         match (&self.name, self.norad_cat_id, &self.object_id) {
-            (Some(name), ..) => name.clone(),
+            (Some(name), ..) => name.chars().filter(|c| !c.is_control()).collect(),
             (None, Some(id), _) => format!("object {id}"),
             (None, None, Some(id)) => id.clone(),
             (None, None, None) => "unnamed object".to_owned(),
