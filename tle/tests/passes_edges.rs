@@ -143,6 +143,8 @@ fn window_that_cannot_be_searched_is_refused_with_a_remedy() {
     assert!(ask(reversed).to_string().contains("exchange the two"));
     let days = LONGEST_WINDOW_DAYS as f64 + 1.0;
     assert!(matches!(ask(search(days, 0.0)), SearchError::WindowTooLong { .. }));
+    let longest = PassSearch::new(EPOCH, EPOCH.plus_seconds(LONGEST_WINDOW_DAYS as f64 * 86_400.0), 90.0);
+    assert!(finder.find(&stations(), &longest).is_ok(), "the days that the refusal names may be searched");
     for elevation in [91.0, -90.5, f64::NAN, f64::INFINITY] {
         assert!(matches!(ask(search(1.0, elevation)), SearchError::Elevation { .. }));
     }

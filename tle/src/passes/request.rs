@@ -39,8 +39,10 @@ impl PassSearch {
         if self.stop < self.start {
             return Err(SearchError::Reversed { start: self.start, stop: self.stop });
         }
-        let days = self.stop.us_since(self.start) / crate::time::DAY_US;
-        if days >= LONGEST_WINDOW_DAYS {
+        // Begun days count.
+        let days =
+            self.stop.us_since(self.start).saturating_add(crate::time::DAY_US - 1) / crate::time::DAY_US;
+        if days > LONGEST_WINDOW_DAYS {
             return Err(SearchError::WindowTooLong { days });
         }
         if self.start < UtcInstant::EARLIEST || self.stop > UtcInstant::LATEST {
