@@ -8,6 +8,18 @@ impl fmt::Display for Config {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kind = if self.is_simulated() { ", simulated" } else { "" };
         writeln!(f, "station {}{kind}, clock {:?}", self.station.name, self.station.clock)?;
+        let place = &self.station;
+        match (place.latitude_deg, place.longitude_deg) {
+            (Some(latitude), Some(longitude)) => writeln!(
+                f,
+                "place {latitude}, {longitude}, {} m: passes from {} degrees up, {} points of horizon, UT1-UTC {} s",
+                place.height_m,
+                place.min_elevation_deg,
+                place.horizon_deg.len(),
+                place.dut1_s,
+            )?,
+            _ => writeln!(f, "no place: nothing is known of passes")?,
+        }
         for satellite in &self.satellites {
             writeln!(
                 f,
