@@ -96,7 +96,13 @@ impl FetchSource {
             (format!("'{}' is no address ({error})", self.shown()), "Give https://host/path?query.")
         })?;
         // Before anything is shown: what stands here is a secret.
-        if !url.username().is_empty() || url.password().is_some() {
+        let names_login = |name: &str| {
+            ["identity", "username", "password"].iter().any(|login| name.eq_ignore_ascii_case(login))
+        };
+        if !url.username().is_empty()
+            || url.password().is_some()
+            || url.query_pairs().any(|(name, _)| names_login(&name))
+        {
             return Err((
                 "a name or password stands in the address".into(),
                 "Put them into a file of mode 0600, two lines, and name it: { url = \"…\", credentials_file = \"…\" }.",
