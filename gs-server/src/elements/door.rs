@@ -83,8 +83,15 @@ impl Door {
         };
         let fresh = self.fresh(satellite, sets).await?;
         let added = fresh.len() as u64;
-        for (at, chunk) in fresh.chunks(SETS_AT_ONCE).enumerate() {
-            let key = if at == 0 { adder.key.clone() } else { format!("{}#{at}", adder.key) };
+        for chunk in fresh.chunks(SETS_AT_ONCE) {
+            // Of more than one chunk some may have been added before we were killed: each has the key of what it holds, or
+            // the rest would count as added too.
+            let key = if sets.len() > SETS_AT_ONCE {
+                let held: Vec<&Elements> = chunk.iter().collect();
+                Adder::of("", satellite, &held).key
+            } else {
+                adder.key.clone()
+            };
             let intent = Intent::AddElements {
                 satellite: satellite.clone(),
                 elements: chunk.to_vec(),

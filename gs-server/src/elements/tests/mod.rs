@@ -6,12 +6,14 @@ mod source;
 use std::time::Duration;
 
 use api::{FetchWord, SourceWord};
-use bench::{HOUR_US, Home, START, everything_in, group};
-use mission::UtcUs;
+use bench::{HOUR_US, Home, START, everything_in, group, iss};
+use mission::sky::SETS_AT_ONCE;
+use mission::{Intent, SatelliteId, UtcUs};
 use reqwest::Url;
 use source::{Source, say, say_with};
 
 use super::client::{Answer, PATIENCE, ask};
+use super::door::{Adder, Door};
 use super::memory::{Memory, State};
 use crate::config::FetchSource;
 
@@ -272,4 +274,28 @@ async fn answers_that_come_too_slowly_or_are_too_long_end() {
     let answer = ask(&fetch, &url, PATIENCE).await;
     assert!(matches!(&answer, Answer::Refused(why) if why.contains("10 MB")), "{answer:?}");
     assert_eq!(source.count(), 3);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_rest_of_a_long_history_is_added_after_a_kill_in_between() {
+    let home = Home::new("");
+    let bench = home.serve(START).await;
+    let door = Door { engine: bench.ready.engine.clone(), store: bench.ready.store.clone() };
+    let satellite = SatelliteId::new("iss").unwrap();
+    let days = (0..SETS_AT_ONCE + 3).map(|at| iss(100.0 + at as f64 / 24.0)).collect::<Vec<_>>().join(",");
+    let text =
+        super::SetsOfText::read(format!("[{days}]").as_bytes(), tle::formats::Checksums::Strict).unwrap();
+    let sets: Vec<_> = text.sets.iter().map(|found| &found.elements).collect();
+    let adder = Adder::of("test", &satellite, &sets);
+    let first = Intent::AddElements {
+        satellite: satellite.clone(),
+        elements: sets[..SETS_AT_ONCE].iter().map(|set| (*set).clone()).collect(),
+        source: "history".to_owned(),
+    };
+    door.engine.intent(adder.principal.clone(), adder.key.clone(), adder.digest, first).await.unwrap();
+    let (added, _) = door.add(&satellite, &sets, "history", &adder).await.unwrap();
+    assert_eq!((added.added, added.held), (3, SETS_AT_ONCE as u64));
+    let (added, _) = door.add(&satellite, &sets, "history", &adder).await.unwrap();
+    assert_eq!((added.added, added.held), (0, sets.len() as u64), "told as added, and not held");
+    bench.end().await;
 }
