@@ -97,6 +97,10 @@ impl Station {
         matches: &mut Vec<(PassKey, Match)>,
     ) {
         let sat = &self.satellites[s];
+        // Elements that are too old to tell presence tell no pass to plan for either.
+        if sat.contact.in_view().is_none() {
+            return;
+        }
         let passes: Vec<PassAhead> =
             sat.sky.passes_ahead().filter(|pass| pass.los_at.is_some()).copied().collect();
         let found: Vec<(UtcUs, UtcUs)> =
@@ -271,8 +275,15 @@ impl Station {
         });
         match refused {
             Some(refused) => refused.to_string(),
+            None if self.is_unbelieved(&run.record.satellite) => {
+                "the elements tell no passes any more: add newer ones".to_owned()
+            }
             None => "by the newest elements the pass is gone, or no pass for this plan any more".to_owned(),
         }
+    }
+
+    fn is_unbelieved(&self, satellite: &SatelliteId) -> bool {
+        self.satellites.iter().any(|sat| sat.id == *satellite && sat.contact.in_view().is_none())
     }
 
     fn drop_run(&mut self, now: Now, at: usize, why: String) {

@@ -55,7 +55,7 @@ impl Station {
         let Some(when) = sat.commands.get(&id).and_then(|command| command.record.when.as_deref()) else {
             return Ok(());
         };
-        let pass = sat.sky.pass(now.utc);
+        let pass = sat.believed_pass(now.utc);
         let needs_pass =
             when.min_elevation_deg.is_some() || when.after_aos_us.is_some() || when.before_los_us.is_some();
         let window = match pass {
@@ -66,7 +66,7 @@ impl Station {
                 let why = "its conditions speak of a pass, and none lasts".into();
                 return Err(Wait {
                     why,
-                    until: sat.sky.next_aos(now.utc).map(|aos| super::outcome::mono_of(now, aos)),
+                    until: sat.believed_aos(now.utc).map(|aos| super::outcome::mono_of(now, aos)),
                 });
             }
             None => ContactWindow { aos: now.utc, los: crate::UtcUs(i64::MAX) },

@@ -425,13 +425,16 @@ impl Station {
     fn window(&self, now: Now, s: usize, at: usize) -> ContactWindow {
         let record = &self.runs[at].record;
         let sky = &self.satellites[s].sky;
-        match sky.pass(now.utc) {
+        let sat = &self.satellites[s];
+        match sat.believed_pass(now.utc) {
             // The antenna may be wanted elsewhere before LOS, or come later than AOS.
             Some(pass) => ContactWindow {
                 aos: record.aos_at.max(pass.aos_at),
                 los: pass.los_at.map_or(record.los_at, |los| los.min(self.planned_stop(at).unwrap_or(los))),
             },
-            None if sky.is_blind() => ContactWindow { aos: record.aos_at, los: record.los_at },
+            None if sky.is_blind() || sat.contact.in_view().is_none() => {
+                ContactWindow { aos: record.aos_at, los: record.los_at }
+            }
             None => ContactWindow { aos: record.aos_at, los: record.los_at.min(now.utc) },
         }
     }

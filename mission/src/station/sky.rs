@@ -182,13 +182,13 @@ impl Sky {
 
 impl Satellite {
     /// The pass that lasts, as far as the elements can be believed.
-    fn believed_pass(&self, at: UtcUs) -> Option<&PassAhead> {
+    pub(super) fn believed_pass(&self, at: UtcUs) -> Option<&PassAhead> {
         self.contact.in_view()?;
         self.sky.pass(at)
     }
 
     /// When the next pass begins, as far as the elements can be believed.
-    fn believed_aos(&self, at: UtcUs) -> Option<UtcUs> {
+    pub(super) fn believed_aos(&self, at: UtcUs) -> Option<UtcUs> {
         self.contact.in_view()?;
         self.sky.next_aos(at)
     }
@@ -333,6 +333,10 @@ impl Station {
             let in_view = sat.sky.pass(now.utc).map(|pass| pass.los_at);
             sat.contact.set_view(in_view);
         } else {
+            if sat.contact.in_view().is_some() {
+                // What was planned by them is planned no more.
+                sat.sky.revision += 1;
+            }
             sat.contact.forget_view();
         }
     }

@@ -413,3 +413,15 @@ fn capture() -> Telecommand {
         strong_compression: false,
     }
 }
+
+#[test]
+fn plans_follow_no_elements_that_are_too_old_to_be_believed() {
+    let (mut world, _) = world();
+    hand_over(&mut world, plan("status", vec![send(Telecommand::Ping)])).unwrap();
+    arm(&mut world, "status", true);
+    assert!(!world.station.status(world.now).schedule.contacts.is_empty());
+    world.pass(60 * 86_400 * S);
+    assert!(world.station.status(world.now).schedule.contacts.is_empty());
+    assert!(world.station.status(world.now).runs.is_empty());
+    assert!(world.events(EventKind::Plan).iter().any(|text| text.contains("add newer ones")));
+}
