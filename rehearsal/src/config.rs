@@ -1,7 +1,10 @@
 //! What kind of world.
 
+use mission::config::Times;
+use mission::{Intent, Profile, SatelliteId, Site};
+use radio::airtime::LinkTiming;
 use satellite::{ChannelConfig, Orbit, PassProfile};
-use tle::Station;
+use tle::{Elements, Station};
 
 /// A world by its seed.
 #[derive(Debug, Clone)]
@@ -29,6 +32,29 @@ pub struct WorldConfig {
     pub operator: Operator,
     /// What goes wrong on the ground.
     pub chaos: Chaos,
+    /// A station and a satellite that exist, with what they are told at the beginning; `None`: made up.
+    pub known: Option<Box<Known>>,
+}
+
+/// A station and a satellite that exist.
+#[derive(Debug, Clone)]
+pub struct Known {
+    /// What it is called.
+    pub satellite: SatelliteId,
+    /// What differs between satellites. The twin knows the same packets and keeps the same rhythm.
+    pub profile: Profile,
+    /// Modem and turn-round of both ends.
+    pub timing: LinkTiming,
+    /// What ground believes of its place; the channel has its own.
+    pub site: Site,
+    /// When the station may transmit, and when it is closed.
+    pub times: Times,
+    /// What ground believes of the orbit; the twin flies [`WorldConfig::orbit`].
+    pub elements: Elements,
+    /// From the end of the boot to the first heartbeat, microseconds.
+    pub first_heartbeat_us: u64,
+    /// What is wanted once ground has its elements, in this order.
+    pub intents: Vec<Intent>,
 }
 
 /// What people do.
@@ -71,6 +97,7 @@ impl WorldConfig {
             view_is_known: false,
             operator: Operator::WantsImage,
             chaos: Chaos::default(),
+            known: None,
         }
     }
 

@@ -8,6 +8,8 @@
 //! The world kills the engine at random moments (what was not committed is gone, what was radiated is radiated), lets
 //! storage fail, and restarts from what the store holds. Time stands still while a batch is unconfirmed.
 //!
+//! [`mod@rehearse`] sends a plan through its coming pass in many such worlds, and tells what may be expected of it.
+//!
 //! What it does **not** do: real time, real ports, real databases. Those are `gs-server demo` and the end-to-end tests.
 //!
 //! ```
@@ -21,11 +23,13 @@
 mod checks;
 mod config;
 mod operator;
+mod parts;
+pub mod rehearse;
 mod report;
 mod store;
 mod world;
 
 pub use checks::{Invariant, Violation};
-pub use config::{Chaos, Operator, WorldConfig};
+pub use config::{Chaos, Known, Operator, WorldConfig};
 pub use report::Report;
 pub use world::World;

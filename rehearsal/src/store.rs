@@ -25,7 +25,7 @@ pub(crate) struct StoredCommand {
     pub(crate) stage: Stage,
     pub(crate) stage_at: UtcUs,
     pub(crate) attempt: u16,
-    on_air_at: Option<UtcUs>,
+    pub(crate) on_air_at: Option<UtcUs>,
 }
 
 /// Everything that a restart needs, and what the checks look at.

@@ -5,24 +5,20 @@ use std::collections::VecDeque;
 use mission::{
     Accepted, Batch, BatchId, CounterRule, Effect, Entropy, Input, Intent, IntentEnvelope, IntentId,
     LinkConfig, LinkId, LinkState, MaybeRadiated, MonoUs, Now, Principal, Profile, SatelliteConfig,
-    SatelliteId, Site, Source, Station, StationConfig, StationId, Transmit, TxId, UtcUs,
+    SatelliteId, Site, Source, Station, StationConfig, Transmit, TxId, UtcUs,
 };
 use protocol::{Counter, Key, KeyId};
-use radio::airtime::{LinkTiming, uart_us};
-use radio::driver::{
-    AuxWiring, Driver, DriverConfig, DriverInput, DriverOutput, DriverState, ModePins, Radiated,
-};
-use radio::model::ModelConfig;
+use radio::airtime::uart_us;
+use radio::driver::{Driver, DriverInput, DriverOutput, DriverState, Radiated};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use satellite::{
-    Camera, Device, DeviceConfig, DeviceOutput, ImageSource, JournalEntry, PassProfile, TwinConfig,
-};
+use satellite::{Device, DeviceOutput, JournalEntry, PassProfile};
 use sha2::{Digest, Sha256};
 
 use crate::checks::{Air, Invariant, Violation};
 use crate::config::WorldConfig;
 use crate::operator::Desk;
+use crate::parts::{device, driver_config, named, named_link, station_name};
 use crate::report::Report;
 use crate::store::Store;
 
@@ -72,6 +68,7 @@ pub struct World {
     idle_steps: u32,
     our_air_us: (u64, u64),
     their_air_us: (u64, u64),
+    refusals: Vec<String>,
 }
 
 impl World {
@@ -81,28 +78,17 @@ impl World {
         let mut key_bytes = [0; 16];
         rng.fill_bytes(&mut key_bytes);
         let key = Key::from_bytes(key_bytes);
-        config.channel.seed = rng.random();
-        let mut twin = TwinConfig::new(rng.random(), key.clone());
-        if !config.real_picture {
-            twin.camera = Camera::Pattern { size_bytes: config.image_bytes };
-            let mut bytes = vec![0; usize::try_from(config.image_bytes).unwrap_or(0)];
-            rng.fill_bytes(&mut bytes);
-            twin.image = ImageSource::Bytes { bytes: bytes.into(), width_px: 408, height_px: 304 };
-        }
-        twin.ranges = config.ranges;
-        twin.orbit = config.orbit.clone();
-        twin.utc_at_zero_ms = config.utc_at_zero_ms;
-        let utc_at_zero_us = i64::try_from(twin.utc_at_zero_ms).unwrap_or(0) * 1_000;
-        let mut device =
-            Device::new(DeviceConfig::new(twin, config.channel.clone(), ModelConfig::prepared(true)));
-        let (satellite, link) = (named("pixelsat-1"), named_link("radio"));
+        let mut device = device(&mut config, &mut rng, &key);
+        let utc_at_zero_us = i64::try_from(config.utc_at_zero_ms).unwrap_or(0) * 1_000;
+        let satellite =
+            config.known.as_ref().map_or_else(|| named("pixelsat-1"), |known| known.satellite.clone());
+        let link = named_link("radio");
         let desk =
             Desk::new(config.operator, ChaCha8Rng::from_rng(&mut rng), satellite.clone(), link.clone());
         let report = Report { seed: config.seed, ..Report::default() };
         Self {
             in_view: device.in_view(0),
             driver: Driver::new(driver_config()),
-            config,
             rng,
             now_us: 0,
             utc_at_zero_us,
@@ -123,11 +109,14 @@ impl World {
             unplug_at: None,
             report,
             hash: Sha256::new(),
-            forget_at: 0,
+            // What is looked at when it is over is not forgotten before.
+            forget_at: if config.known.is_some() { u64::MAX } else { 0 },
             lives: 0,
             idle_steps: 0,
+            config,
             our_air_us: (0, 0),
             their_air_us: (0, 0),
+            refusals: Vec::new(),
         }
     }
 
@@ -190,6 +179,16 @@ impl World {
     /// The image on the ground is the satellite's, byte for byte.
     pub fn images_equal(&self) -> bool {
         matches!(self.store.image(), Some((_, Some(bytes))) if bytes == self.device.twin().image())
+    }
+
+    /// What the engine has stored.
+    pub(crate) fn store(&self) -> &Store {
+        &self.store
+    }
+
+    /// What the engine refused, as sentences.
+    pub(crate) fn refusals(&self) -> &[String] {
+        &self.refusals
     }
 
     /// Simulated seconds since the beginning.
@@ -311,6 +310,9 @@ impl World {
 
     /// Where the station stands, where that decides the passes and ground may know them.
     fn site(&self) -> Option<Site> {
+        if let Some(known) = &self.config.known {
+            return Some(known.site.clone());
+        }
         let PassProfile::Orbit { station, orientation } = &self.config.channel.passes else { return None };
         self.config.view_is_known.then(|| Site {
             place: (**station).clone(),
@@ -401,6 +403,10 @@ impl World {
             self.tell_elements();
             self.tell_view();
         }
+        let intents = self.config.known.as_mut().map(|known| std::mem::take(&mut known.intents));
+        for (number, intent) in (u64::MAX / 2..).zip(intents.unwrap_or_default()) {
+            self.want(number, intent);
+        }
         self.driver_out();
         if self.lives == 1 {
             self.plan_chaos();
@@ -412,15 +418,21 @@ impl World {
         if self.site().is_none() {
             return;
         }
-        let elements = vec![self.device.twin().orbit().elements().clone()];
+        let known = self.config.known.as_ref();
+        let elements = known.map_or_else(|| self.device.twin().orbit().elements(), |known| &known.elements);
         let (satellite, source) = (self.satellite.clone(), "the rehearsal".to_owned());
-        let number = u64::MAX - self.lives;
+        let elements = vec![elements.clone()];
+        self.want(u64::MAX - self.lives, Intent::AddElements { satellite, elements, source });
+    }
+
+    /// Somebody wants something; the number is told once.
+    fn want(&mut self, number: u64, intent: Intent) {
         self.tell(Input::Intent(IntentEnvelope {
             id: IntentId(number),
             principal: Principal::new("rehearsal"),
             idempotency_key: number.to_string(),
             digest: [0; 32],
-            intent: Intent::AddElements { satellite, elements, source },
+            intent,
         }));
     }
 
@@ -585,6 +597,9 @@ impl World {
                     self.desk.accepted(command);
                 }
             }
+            Effect::Reply { result: Err(refusal), .. } if self.config.known.is_some() => {
+                self.refusals.push(refusal.to_string());
+            }
             Effect::Reply { result: Err(_), .. } | Effect::Reserve(_) | Effect::ReserveClear => {}
         }
         Ok(())
@@ -600,26 +615,33 @@ impl World {
         self.driver_out();
     }
 
+    fn profile(&self) -> Profile {
+        match &self.config.known {
+            Some(known) => known.profile,
+            None => Profile {
+                tags: self.config.tags,
+                ranges: self.config.ranges,
+                counter: CounterRule::Time,
+                ..Profile::default()
+            },
+        }
+    }
+
     fn station_config(&self) -> StationConfig {
         StationConfig {
             station: station_name(),
             site: self.site(),
-            times: mission::config::Times::default(),
+            times: self.config.known.as_ref().map(|known| known.times.clone()).unwrap_or_default(),
             satellites: vec![SatelliteConfig {
                 id: self.satellite.clone(),
-                profile: Profile {
-                    tags: self.config.tags,
-                    ranges: self.config.ranges,
-                    counter: CounterRule::Time,
-                    ..Profile::default()
-                },
+                profile: self.profile(),
                 key: Some(self.key.clone()),
                 limits: Vec::new(),
             }],
             links: vec![LinkConfig {
                 id: self.link.clone(),
                 satellite: self.satellite.clone(),
-                timing: LinkTiming::default(),
+                timing: self.config.known.as_ref().map(|known| known.timing).unwrap_or_default(),
                 armed: true,
                 receive_only: false,
             }],
@@ -630,23 +652,4 @@ impl World {
 /// Two stretches of time share a moment.
 fn overlap(a: (u64, u64), b: (u64, u64)) -> bool {
     a.0 < b.1 && b.0 < a.1
-}
-
-fn driver_config() -> DriverConfig {
-    DriverConfig { mode_pins: ModePins::Software, aux: AuxWiring::Absent, ..DriverConfig::default() }
-}
-
-#[expect(clippy::expect_used, reason = "a literal that keeps the rule of names")]
-fn named(name: &str) -> SatelliteId {
-    SatelliteId::new(name).expect("a legal name")
-}
-
-#[expect(clippy::expect_used, reason = "a literal that keeps the rule of names")]
-fn named_link(name: &str) -> LinkId {
-    LinkId::new(name).expect("a legal name")
-}
-
-#[expect(clippy::expect_used, reason = "a literal that keeps the rule of names")]
-fn station_name() -> StationId {
-    StationId::new("home").expect("a legal name")
 }

@@ -55,6 +55,8 @@ pub struct ChannelConfig {
     pub noise: f64,
     /// When the satellite is in view, and how high. Fixed from [`Channel::new`] on.
     pub passes: PassProfile,
+    /// Added to every frame's strength, dB: pointing, cables, polarisation, a noisy neighbourhood.
+    pub level_db: f64,
     /// Whether weak signals near the horizon are lost more often. Below the horizon nothing is heard in any case.
     pub elevation_loss: bool,
 }
@@ -70,6 +72,7 @@ impl Default for ChannelConfig {
             cut: 0.0,
             noise: 0.0,
             passes: PassProfile::default(),
+            level_db: 0.0,
             elevation_loss: true,
         }
     }
@@ -237,7 +240,7 @@ impl Channel {
 
     /// What becomes of a frame of this mean strength.
     fn fade(&mut self, mean_dbm: f64, packet: &[u8]) -> Result<(Vec<u8>, i16), LossCause> {
-        let power_dbm = mean_dbm + self.rng.random_range(-FADING_DB..=FADING_DB);
+        let power_dbm = mean_dbm + self.config.level_db + self.rng.random_range(-FADING_DB..=FADING_DB);
         if self.config.elevation_loss && self.chance(weak_loss(power_dbm)) {
             return Err(LossCause::Weak);
         }
@@ -372,6 +375,17 @@ mod tests {
         assert!((20..600).contains(&lost(5.0)), "{}", lost(5.0));
         assert!(lost(20.0) < 10);
         assert_eq!(lost(-1.0), 2_000);
+    }
+
+    #[test]
+    fn a_weaker_link_loses_more_near_the_horizon() {
+        let lost = |level_db| {
+            let passes = PassProfile::Always { elevation_deg: 8.0 };
+            let mut channel = channel(ChannelConfig { passes, level_db, ..ChannelConfig::default() });
+            (0..2_000).filter(|_| received(channel.down(0, &[1])).is_none()).count()
+        };
+        assert!(lost(-4.0) > lost(0.0) + 500, "{} {}", lost(-4.0), lost(0.0));
+        assert!(lost(0.0) >= lost(4.0));
     }
 
     #[test]
