@@ -14,6 +14,7 @@ mod passes;
 mod plan;
 mod radio;
 mod redecode;
+mod rehearse;
 mod rig;
 mod rotator;
 mod serve;
@@ -85,6 +86,8 @@ pub enum Command {
     /// Plans: what to do in a pass. Begin one, check one
     #[command(subcommand)]
     Plan(plan::Plan),
+    /// Send a plan through its coming pass many times in simulation, and tell what to expect
+    Rehearse(rehearse::Rehearse),
     /// The antenna's rotator by hand, through rotctld
     #[command(subcommand)]
     Rotator(rotator::Rotator),
@@ -132,6 +135,7 @@ impl Cli {
             Command::Elements(elements) => elements.run(),
             Command::Key(key) => key.run(),
             Command::Plan(plan) => plan.run(),
+            Command::Rehearse(rehearse) => rehearse.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

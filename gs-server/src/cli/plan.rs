@@ -191,7 +191,8 @@ impl Check {
     }
 }
 
-fn read(file: &Path, name: &str) -> Result<String, Failure> {
+/// The text of a plan, from a file or standard input.
+pub(super) fn read(file: &Path, name: &str) -> Result<String, Failure> {
     let mut text = String::new();
     let result = if name == "-" {
         io::stdin().lock().take(READ_MAX).read_to_string(&mut text)
@@ -203,7 +204,7 @@ fn read(file: &Path, name: &str) -> Result<String, Failure> {
 }
 
 /// `FILE:LINE:COLUMN: error at FIELD: PROBLEM. REMEDY`.
-fn line(name: &str, finding: &PlanFinding) -> String {
+pub(super) fn line(name: &str, finding: &PlanFinding) -> String {
     let place = match (finding.line, finding.column) {
         (Some(line), Some(column)) => format!("{name}:{line}:{column}"),
         _ => name.to_owned(),
@@ -213,12 +214,12 @@ fn line(name: &str, finding: &PlanFinding) -> String {
 }
 
 /// What a configuration says of its satellites and their links.
-struct ConfiguredLinks {
+pub(super) struct ConfiguredLinks {
     links: Vec<(SatelliteId, Profile, LinkTiming)>,
 }
 
 impl ConfiguredLinks {
-    fn load(path: &Path) -> Result<Self, Failure> {
+    pub(super) fn load(path: &Path) -> Result<Self, Failure> {
         let config = Config::load(path).map_err(Failure::usage)?;
         config.check().map_err(Failure::usage)?;
         let station = station_config(&config, &Default::default()).map_err(Failure::usage)?;
@@ -230,12 +231,12 @@ impl ConfiguredLinks {
         Ok(Self { links: links.collect() })
     }
 
-    fn of(&self, satellite: &SatelliteId) -> Option<(Profile, LinkTiming)> {
+    pub(super) fn of(&self, satellite: &SatelliteId) -> Option<(Profile, LinkTiming)> {
         self.links.iter().find(|(id, ..)| id == satellite).map(|(_, profile, timing)| (*profile, *timing))
     }
 }
 
-fn unknown_satellite(satellite: &SatelliteId) -> PlanFinding {
+pub(super) fn unknown_satellite(satellite: &SatelliteId) -> PlanFinding {
     PlanFinding {
         severity: "error".to_owned(),
         place: "satellite".to_owned(),

@@ -67,6 +67,20 @@ pub(super) struct Sky {
 }
 
 impl SkyArgs {
+    /// For a verb that has its own words for these.
+    pub(super) fn of(elements: Vec<PathBuf>, station: Vec<Place>, config: Option<PathBuf>) -> Self {
+        Self {
+            elements,
+            station,
+            config,
+            satellite: Vec::new(),
+            lenient: false,
+            frequency: None,
+            dut1: None,
+            json: false,
+        }
+    }
+
     /// Reads what was named. What cannot be used of it is told on standard error.
     pub(super) fn read(&self, window: (UtcInstant, UtcInstant)) -> Result<Sky, Failure> {
         let Sky { mut catalogue, places, orientation, min_elevation_deg } = match (

@@ -67,6 +67,16 @@ pub fn check_text(text: &str, form: Form, context: &CheckContext) -> CheckedText
     CheckedText { plan, findings }
 }
 
+/// Findings of another look at a plan, with line and column in its text.
+pub fn place_findings(
+    text: &str,
+    form: Form,
+    findings: impl IntoIterator<Item = Finding>,
+) -> Vec<PlanFinding> {
+    let places = place::Places::new(text, form);
+    findings.into_iter().map(|finding| places.put(finding)).collect()
+}
+
 /// The same for what came as words already.
 pub fn check_words(words: &PlanText, context: &CheckContext) -> (Option<Plan>, Vec<Finding>) {
     match words::plan(words) {

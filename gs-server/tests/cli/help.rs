@@ -52,6 +52,7 @@ fn every_verb_tells_what_it_does() {
             "gs-server-plan",
             "gs-server-plan-new",
             "gs-server-plan-check",
+            "gs-server-rehearse",
             "gs-server-rotator",
             "gs-server-rotator-probe",
             "gs-server-rotator-point",

@@ -10,6 +10,7 @@ mod files;
 mod help;
 mod plan;
 mod radio;
+mod rehearse;
 mod twin;
 
 use std::ffi::OsStr;
