@@ -380,7 +380,7 @@ mod tests {
     #[test]
     fn a_weaker_link_loses_more_near_the_horizon() {
         let lost = |level_db| {
-            let passes = PassProfile::Always { elevation_deg: 8.0 };
+            let passes = PassProfile::Always { elevation_deg: 5.0 };
             let mut channel = channel(ChannelConfig { passes, level_db, ..ChannelConfig::default() });
             (0..2_000).filter(|_| received(channel.down(0, &[1])).is_none()).count()
         };
