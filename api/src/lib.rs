@@ -5,6 +5,7 @@
 //! | [`Time`] | RFC 3339 in UTC with milliseconds, the form of a time on the wire (orbits: [`FineTime`]) |
 //! | [`Version`], [`Health`] | the handshake: who is there, what it can, whether it is well |
 //! | [`StationView`] | how the station is right now |
+//! | [`AntennaView`] | rotator and rig, and what the radio bears of the Doppler shift |
 //! | [`FrameView`], [`TelemetryPage`], [`EventView`], [`AuditView`] | what was heard, the values in it, what happened, who did what |
 //! | [`CommandRequest`], [`CommandView`] | telecommands: asked for, and on their way |
 //! | [`telecommand`] | every telecommand of the ICD to JSON and back, with errors that name the field |
@@ -20,6 +21,7 @@
 //! What this crate does **not** do: it has no HTTP, no clock and no SQL, and it knows `protocol` only. The server
 //! converts its own types into these.
 
+mod antenna;
 mod command;
 mod download;
 mod elements;
@@ -37,6 +39,7 @@ mod telemetry;
 mod time;
 mod version;
 
+pub use antenna::{AntennaView, AxesView, DopplerView, RigView, RotatorPass, RotatorView};
 pub use command::{CommandRequest, CommandView, GateWord, Outcome, OutcomeWord, StageView};
 pub use download::{DownloadRequest, DownloadView};
 pub use elements::{

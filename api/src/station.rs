@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Time;
+use crate::{AntennaView, Time};
 
 /// The station now. A view, not a record: it is not kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,9 @@ pub struct StationView {
     pub sealing: Vec<SealingView>,
     /// Storage.
     pub storage: StorageView,
+    /// Rotator and rig, as `/antenna` tells them; `null` when there is neither.
+    #[serde(default)]
+    pub antenna: Option<AntennaView>,
     /// What a demo tells of itself (speed, seed, loss); for people, of no fixed shape.
     pub demo: Option<serde_json::Value>,
 }

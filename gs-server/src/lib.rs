@@ -17,6 +17,7 @@
 //! | [`keys`], [`decode`] | key files; captures to JSON |
 //! | [`twin`], [`demo`] | the simulated satellite behind a real port; a pass with everything real but the satellite |
 //! | [`plan`] | plans as text: read, checked, templates |
+//! | `pointing` | whom the antenna follows, by the schedule |
 //! | [`cli`] | the command line, a file per verb |
 //!
 //! What it does **not** do: decide what to send or when (the mission engine does), know the wire format (`protocol`
@@ -36,6 +37,7 @@ pub mod keys;
 pub mod lifecycle;
 pub mod links;
 pub mod plan;
+mod pointing;
 pub mod run;
 pub mod sky;
 pub mod storage;

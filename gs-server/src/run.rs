@@ -5,7 +5,7 @@
 //!
 //! Order at start: configuration, keys, archive (lock, check, snapshot, reserve), engine, links, API; then it is ready.
 //! Order at the end, 5 s in all: the API takes nothing new and the engine radiates nothing new, links finish the frame
-//! that is on the air, everything that came in becomes durable, the archive is closed.
+//! that is on the air and the antenna parks, everything that came in becomes durable, the archive is closed.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -25,11 +25,13 @@ use crate::config::{Changes, Config, ConfigError, station_config};
 use crate::elements::task::ElementsTask;
 use crate::elements::{Door, ElementsHandle, Fetcher, Wanted};
 use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, OsEntropy};
-use crate::http::{self, AllowedHosts, HttpState, Identity, Token, TokenError};
+use crate::http::{self, AllowedHosts, HttpState, Identity, RadioOnAir, Token, TokenError};
+use crate::hamlib::{self, AntennaTask};
 use crate::hub::Hub;
 use crate::keys::{self, KeyError};
 use crate::lifecycle::{Lifecycle, TaskFailure};
 use crate::links::{self, LinkParts};
+use crate::pointing::{Place, Steering};
 use crate::storage::reserve::ReserveError;
 use crate::storage::{EventQuery, Page, Store, StoreError, StoreOptions};
 
@@ -156,6 +158,9 @@ pub enum RunError {
     /// The reserve.
     #[error("the reserve cannot be read")]
     Reserve(#[from] ReserveError),
+    /// The rotator.
+    #[error("the rotator of the configuration cannot be")]
+    Rotator(#[from] mission::pointing::MountFault),
     /// The token file.
     #[error(transparent)]
     Token(#[from] TokenError),
@@ -225,6 +230,8 @@ pub async fn run_with(
     let (ports, commands): (Vec<_>, Vec<_>) =
         station.links.iter().map(|link| LinkPort::new(link.id.clone())).unzip();
     let identity = Identity::of(&station, config.is_simulated());
+    let (antenna, antenna_tasks) = hamlib::antenna(config.rotator.as_ref(), config.rig.as_ref(), &timer)?;
+    let (place, radios_on_air) = (Place::of(&station), RadioOnAir::of(&station, &config));
     let ids: Vec<LinkId> = station.links.iter().map(|link| link.id.clone()).collect();
     let (engine, inbox, handle) = Engine::new(EngineParts {
         station,
@@ -253,12 +260,19 @@ pub async fn run_with(
             Ok(())
         });
     }
+    if !antenna_tasks.is_empty() {
+        let steering =
+            Steering::new(place, config.rotator.as_ref(), handle.clone(), inbox.clone(), antenna.clone());
+        point(&radios, steering, antenna_tasks);
+    }
     let elements = elements(&config, &handle, &store, &timer, &api)?;
     let state = HttpState {
         elements,
         store: store.clone(),
         engine: handle.clone(),
         hub: hub.clone(),
+        antenna,
+        radios: radios_on_air,
         timer: Arc::clone(&timer),
         token,
         identity,
@@ -430,6 +444,22 @@ fn elements(
         Ok(())
     });
     Ok(handle)
+}
+
+/// Rotator and rig, and who steers them. They live and die with the links: whatever ends the server parks the antenna.
+fn point(radios: &Lifecycle, steering: Steering, tasks: Vec<AntennaTask>) {
+    for task in tasks {
+        let stop = radios.soft.clone();
+        radios.spawn(task.name(), async move {
+            task.run(stop).await;
+            Ok(())
+        });
+    }
+    let stop = radios.soft.clone();
+    radios.spawn("steering", async move {
+        steering.run(stop).await;
+        Ok(())
+    });
 }
 
 /// Applies what can be applied of changed configurations, and names what needs a restart.

@@ -183,6 +183,7 @@ impl Engine {
             EngineMessage::View { satellite, in_view } => {
                 self.handle(Input::View { satellite: &satellite, in_view });
             }
+            EngineMessage::Antenna { fault } => self.handle(Input::Antenna { fault: fault.as_deref() }),
         }
     }
 

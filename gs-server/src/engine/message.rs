@@ -60,6 +60,11 @@ pub enum EngineMessage {
         /// As in [`mission::Input::View`].
         in_view: Option<Option<UtcUs>>,
     },
+    /// How the rotator is.
+    Antenna {
+        /// What is wrong with it, as a sentence; `None`: nothing.
+        fault: Option<String>,
+    },
 }
 
 /// A way into the engine. Cheap to clone; the engine's work is done when all are gone.

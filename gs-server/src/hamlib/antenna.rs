@@ -105,6 +105,8 @@ pub struct RotatorStatus {
     pub info: Option<String>,
     /// What it is doing.
     pub goal: Goal,
+    /// Since when; `None` before the first look.
+    pub goal_since: Option<UtcUs>,
     /// Where it stands, when that could be read.
     pub position: Option<Position>,
     /// When that was read.

@@ -301,6 +301,10 @@ impl Turning {
             Job::Stop | Job::Stopped => self.status.goal = Goal::Stopped,
             Job::Follow { .. } => {}
         }
+        let kind = std::mem::discriminant(&self.status.goal);
+        if self.status.goal_since.is_none() || kind != std::mem::discriminant(&self.publisher.borrow().goal) {
+            self.status.goal_since = Some(now.utc);
+        }
         self.status.trouble = continued(&self.publisher.borrow().trouble, trouble, now, "rotator");
         self.publisher.send_if_modified(|told| {
             let is_new = **told != self.status;

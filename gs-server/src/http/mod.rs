@@ -8,6 +8,7 @@
 //!
 //! What it does **not** do: decide anything (intents go to the engine), know SQL (the store answers), read a clock.
 
+mod antenna;
 mod clock;
 mod commands;
 mod downloads;
@@ -49,9 +50,11 @@ use tower_http::compression::CompressionLayer;
 use crate::clock::Timer;
 use crate::elements::ElementsHandle;
 use crate::engine::EngineHandle;
+use crate::hamlib::AntennaHandle;
 use crate::hub::Hub;
 use crate::storage::Store;
 
+pub use antenna::RadioOnAir;
 pub use hosts::AllowedHosts;
 pub use token::{Token, TokenError};
 
@@ -69,6 +72,10 @@ pub struct HttpState {
     pub elements: ElementsHandle,
     /// Committed events as they come.
     pub hub: Hub,
+    /// Rotator and rig, as far as there are any.
+    pub antenna: AntennaHandle,
+    /// The radios that are not tuned with the Doppler shift.
+    pub radios: Vec<RadioOnAir>,
     /// The station's time, simulated or not.
     pub timer: Arc<dyn Timer>,
     /// What every write must show.

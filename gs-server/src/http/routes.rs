@@ -7,7 +7,7 @@ use axum::routing::{MethodRouter, get, post};
 
 use super::write::guard_write;
 use super::{
-    App, clock, commands, downloads, elements, events, frames, images, keys, links, page, sky, station,
+    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, page, sky, station,
     status, stream, telemetry,
 };
 
@@ -60,6 +60,7 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/health", status::health),
         read("/api/v1/version", status::version),
         read("/api/v1/station", station::get),
+        read("/api/v1/antenna", antenna::get),
         read("/api/v1/frames", frames::list),
         read("/api/v1/frames/{id}", frames::get),
         read("/api/v1/telemetry", telemetry::series),

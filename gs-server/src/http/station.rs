@@ -44,6 +44,7 @@ pub(super) fn view(app: &App, status: &Status, last_sequence: i64) -> StationVie
             derived_dropped: storage.derived_dropped,
             frames_lost: storage.frames_lost,
         },
+        antenna: super::antenna::of_station(app, status),
         demo: app.state.demo.clone(),
     }
 }

@@ -102,6 +102,13 @@ impl Bench {
             store: store.clone(),
             engine: handle,
             hub: hub.clone(),
+            antenna: crate::hamlib::antenna(None, None, &timer).unwrap().0,
+            radios: vec![super::RadioOnAir {
+                link: LinkId::new("e22").unwrap(),
+                satellite: SatelliteId::new("pixelsat-1").unwrap(),
+                phy: LoraPhy::LIKELY_2K4,
+                frequency_hz: 435_000_000.0,
+            }],
             timer: Arc::clone(&timer),
             token: Token::new(TOKEN).unwrap(),
             identity,

@@ -122,3 +122,11 @@ async fn a_picture_is_served_while_it_grows() {
     assert_eq!((again.status().as_u16(), again.bytes.len()), (304, 0));
     assert_eq!(bench.get("/api/v1/images/2/file").await.problem(), "not-found");
 }
+
+#[tokio::test]
+async fn an_antenna_that_is_not_there_is_told_as_unknown() {
+    let bench = Bench::new().await;
+    let told = bench.get("/api/v1/antenna").await.ok();
+    assert_eq!(told, json!({"rotator": null, "rig": null, "doppler": []}), "nor is there a place");
+    assert_eq!(bench.get("/api/v1/station").await.ok()["antenna"], Value::Null);
+}
