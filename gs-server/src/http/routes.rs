@@ -7,8 +7,8 @@ use axum::routing::{MethodRouter, get, post};
 
 use super::write::guard_write;
 use super::{
-    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, page, sky, station,
-    status, stream, telemetry,
+    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, page, sky,
+    station, status, stream, telemetry,
 };
 
 /// What a path is for.

@@ -145,7 +145,10 @@ impl Steering {
 }
 
 /// How long before AOS an antenna must know: what turning all the way round takes, and some more.
-#[expect(clippy::cast_possible_truncation, reason = "rates are above 0, as the configuration's check sees to")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "rates are above 0, as the configuration's check sees to"
+)]
 fn lead_us(rotator: Option<&RotatorSection>) -> i64 {
     let takes_s = |(first, last): (f64, f64), rate_deg_s: f64| (last - first).abs() / rate_deg_s;
     let lead_s = rotator.map_or(RIG_LEAD_S, |section| {

@@ -53,12 +53,7 @@ pub(super) struct Rules {
 ///    leaves time to turn.
 ///
 /// Passes outside the schedule end a lead before the next contact, and where a blackout begins.
-pub(super) fn target(
-    status: &Status,
-    rules: &Rules,
-    now: UtcUs,
-    current: Option<&Target>,
-) -> Option<Target> {
+pub(super) fn target(status: &Status, rules: &Rules, now: UtcUs, current: Option<&Target>) -> Option<Target> {
     if rules.blackouts.iter().any(|window| window.start <= now && now < window.stop) {
         return None;
     }
@@ -68,10 +63,8 @@ pub(super) fn target(
         .iter()
         .filter(|contact| contact.station == status.station && now < contact.stop)
         .collect();
-    let next = contacts
-        .iter()
-        .filter_map(|contact| of_contact(status, contact))
-        .min_by_key(|contact| contact.aos);
+    let next =
+        contacts.iter().filter_map(|contact| of_contact(status, contact)).min_by_key(|contact| contact.aos);
     let closes = next.as_ref().map(|contact| contact.aos.plus(-rules.lead_us));
     if let Some(closes) = closes
         && closes <= now
@@ -116,10 +109,10 @@ fn choose(free: Vec<(Target, f64)>, rules: &Rules, now: UtcUs) -> Option<Target>
     let (first, _) = free.iter().min_by(|(a, high_a), (b, high_b)| {
         begins(a).cmp(&begins(b)).then_with(|| high_b.total_cmp(high_a))
     })?;
-    let (highest, _) = free
-        .iter()
-        .filter(|(other, _)| other.aos < first.los)
-        .max_by(|(a, high_a), (b, high_b)| high_a.total_cmp(high_b).then_with(|| begins(b).cmp(&begins(a))))?;
+    let (highest, _) =
+        free.iter().filter(|(other, _)| other.aos < first.los).max_by(|(a, high_a), (b, high_b)| {
+            high_a.total_cmp(high_b).then_with(|| begins(b).cmp(&begins(a)))
+        })?;
     let turns = highest.aos.plus(-rules.lead_us);
     if highest.satellite != first.satellite && turns.0.saturating_sub(begins(first).0) >= LEAST_US {
         let los = first.los.min(turns);
@@ -130,9 +123,10 @@ fn choose(free: Vec<(Target, f64)>, rules: &Rules, now: UtcUs) -> Option<Target>
 
 fn skies(status: &Status) -> impl Iterator<Item = (&SatelliteId, &SkyStatus)> {
     let known = |sky: &&SkyStatus| sky.fault.is_none();
-    status.satellites.iter().filter_map(move |satellite| {
-        Some((&satellite.satellite, satellite.sky.as_ref().filter(known)?))
-    })
+    status
+        .satellites
+        .iter()
+        .filter_map(move |satellite| Some((&satellite.satellite, satellite.sky.as_ref().filter(known)?)))
 }
 
 /// A whole contact has the times of its pass to the microsecond, one that was cut those of the schedule.

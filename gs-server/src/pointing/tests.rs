@@ -168,10 +168,7 @@ fn what_is_followed_is_followed_to_its_los() {
     let before = status(vec![satellite("a", 1, vec![pass(600, 1200, 20.0)])], vec![]);
     let current = target(&before, &rules(), at(700), None);
     let after = status(
-        vec![
-            satellite("a", 1, vec![pass(600, 1200, 20.0)]),
-            satellite("b", 2, vec![pass(650, 1300, 80.0)]),
-        ],
+        vec![satellite("a", 1, vec![pass(600, 1200, 20.0)]), satellite("b", 2, vec![pass(650, 1300, 80.0)])],
         vec![],
     );
     let name = |current| target(&after, &rules(), at(710), current).unwrap().satellite.to_string();
@@ -229,10 +226,8 @@ fn nothing_is_followed_in_a_blackout() {
     assert_eq!(followed(&one, &closed(0, 2000), 2000), []);
     assert_eq!(followed(&one, &closed(900, 1000), 2000), [told("a", 480, 900), told("a", 1000, 1200)]);
     assert_eq!(followed(&one, &closed(0, 800), 2000), [told("a", 800, 1200)], "it does not turn before");
-    let scheduled = status(
-        vec![satellite("a", 1, vec![pass(600, 1200, 80.0)])],
-        vec![contact("a", 1000, 1200, false)],
-    );
+    let scheduled =
+        status(vec![satellite("a", 1, vec![pass(600, 1200, 80.0)])], vec![contact("a", 1000, 1200, false)]);
     assert_eq!(followed(&scheduled, &closed(500, 1000), 2000), [told("a", 1000, 1200)]);
 }
 

@@ -12,7 +12,7 @@ use gs_server::run::RunOptions;
 use gs_server::storage::EventQuery;
 use mission::plan::CheckContext;
 use mission::pointing::{Direction, Position, look_at};
-use mission::{Clock as _, Intent, PlanName, Principal, SatelliteId, Site, UtcUs};
+use mission::{Intent, PlanName, Principal, SatelliteId, Site, UtcUs};
 use tle::formats::{Checksums, sets};
 use tle::passes::{Pass, PassFinder, PassSearch};
 use tle::{Elements, Propagator};
@@ -87,8 +87,7 @@ fn elements() -> Elements {
 /// A low pass that begins in the north: slow enough for the dummy, and not far from where it rests.
 fn pass(site: &Site) -> Pass {
     let start: tle::UtcInstant = "2020-07-13T00:00:00Z".parse().unwrap();
-    let search =
-        PassSearch::new(start, start.plus_seconds(2.0 * 86_400.0), site.min_elevation_deg);
+    let search = PassSearch::new(start, start.plus_seconds(2.0 * 86_400.0), site.min_elevation_deg);
     let passes = PassFinder::new(&elements()).unwrap().find(std::slice::from_ref(&site.place), &search);
     let starts_north = |pass: &Pass| {
         pass.tca.look.elevation_deg < 25.0
@@ -196,8 +195,7 @@ async fn a_rotator_that_dies_is_told_of_before_the_pass() {
     let server = start(config, aos.plus(-420 * S)).await;
     give(&server, "elements", elements()).await;
     let text = "name = \"ear\"\nsatellite = \"sat\"\n[attach]\n[[steps]]\ndo = \"listen\"\nfor_s = 60\n";
-    let context =
-        CheckContext { timing: Default::default(), profile: None, pass: None, now: None };
+    let context = CheckContext { timing: Default::default(), profile: None, pass: None, now: None };
     let checked = check_text(text, Form::Toml, &context);
     let plan = Arc::new(checked.plan.unwrap_or_else(|| panic!("{:?}", checked.findings)));
     want(&server, "plan", Intent::AddPlan { plan, text: text.into() }).await;
@@ -212,7 +210,10 @@ async fn a_rotator_that_dies_is_told_of_before_the_pass() {
     assert!(server.ready.timer.now().utc < aos.plus(-300 * S), "the machine is too slow for this test");
     let told = async || {
         let events = server.ready.store.events(&EventQuery::default()).await.unwrap();
-        events.into_iter().map(|event| event.record.message).find(|message| message.starts_with("before the pass"))
+        events
+            .into_iter()
+            .map(|event| event.record.message)
+            .find(|message| message.starts_with("before the pass"))
     };
     until("the event before the pass", Duration::from_secs(30), async || told().await.is_some()).await;
     let told = told().await.unwrap();
