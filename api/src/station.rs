@@ -25,7 +25,7 @@ pub struct StationView {
     pub storage: StorageView,
     /// Rotator and rig, as `/antenna` tells them; `null` when there is neither.
     #[serde(default)]
-    pub antenna: Option<AntennaView>,
+    pub antenna: Option<Box<AntennaView>>,
     /// What a demo tells of itself (speed, seed, loss); for people, of no fixed shape.
     pub demo: Option<serde_json::Value>,
 }

@@ -53,9 +53,9 @@ pub(super) async fn get(State(app): State<App>) -> Json<AntennaView> {
 }
 
 /// For the station's view: nothing when there is neither rotator nor rig.
-pub(super) fn of_station(app: &App, status: &Status) -> Option<AntennaView> {
+pub(super) fn of_station(app: &App, status: &Status) -> Option<Box<AntennaView>> {
     let found = app.state.antenna.status();
-    (found.rotator.is_some() || found.rig.is_some()).then(|| view(app, status))
+    (found.rotator.is_some() || found.rig.is_some()).then(|| Box::new(view(app, status)))
 }
 
 fn view(app: &App, status: &Status) -> AntennaView {
