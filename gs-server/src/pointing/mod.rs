@@ -1,6 +1,6 @@
 //! The antenna follows the schedule.
 //!
-//! [`target`] says whom to follow, and knows nothing but the engine's status; [`Steering`] tells rotator and rig, and tells
+//! [`target()`] says whom to follow, and knows nothing but the engine's status; [`Steering`] tells rotator and rig, and tells
 //! the engine how the rotator is, so that it is said before a pass and not after it.
 //!
 //! It does **not** know how to turn an antenna (`hamlib` does) or when to transmit (the engine does).
