@@ -12,6 +12,7 @@
 //! | [`ImageView`], [`ChunkMap`], [`DownloadView`] | pictures and the orders to bring them home |
 //! | [`PassList`], [`LookList`], [`PassKept`], [`ElementsView`] | what is in the sky, with [`FineTime`] to the microsecond |
 //! | [`ElementsRequest`], [`HeldElements`], [`FetchReport`] | elements: given, held, fetched |
+//! | [`PlanText`], [`PlanView`], [`ScheduleView`], [`RunReport`] | plans, which pass gets which, and what came of it |
 //! | [`StreamMessage`] | what the WebSocket says |
 //! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
 //!
@@ -31,6 +32,7 @@ mod image;
 mod page;
 mod plan;
 mod problem;
+mod run;
 mod sky;
 mod station;
 mod stream;
@@ -55,6 +57,10 @@ pub use plan::{
     PlanText, StepText,
 };
 pub use problem::{FieldError, Problem, ProblemKind};
+pub use run::{
+    AttachRequest, ContactView, PlanView, RefusedView, RivalView, RunReport, RunView, ScheduleView,
+    StepReport,
+};
 pub use sky::{
     ElementsUsed, ElementsView, FineTime, LookList, LookView, PassEndWord, PassKept, PassList, PassView,
     RefusedElements, SkyGapView,
@@ -72,5 +78,5 @@ pub use version::{Health, Version};
 pub const API_VERSION: u32 = 1;
 
 /// What this version can do; a client asks for a capability by name, never by version number.
-pub const CAPABILITIES: [&str; 7] =
-    ["archive", "commands", "downloads", "images", "idempotency", "limits", "stream-resume"];
+pub const CAPABILITIES: [&str; 8] =
+    ["archive", "commands", "downloads", "images", "idempotency", "limits", "plans", "stream-resume"];

@@ -48,6 +48,10 @@ create table plan_runs (
     crc integer not null
 ) strict;
 
+-- What was heard in a pass is counted for its report.
+create index frames_by_time on frames (satellite, station, heard_at_us);
+create index chunks_by_frame on chunks (frame);
+
 create index plan_runs_by_time on plan_runs (satellite, aos_at_us);
 create index plan_runs_open on plan_runs (id) where state in ('planned', 'waiting', 'running', 'held');
 

@@ -12,11 +12,14 @@ mod key;
 mod look;
 mod passes;
 mod plan;
+mod plans;
 mod radio;
 mod redecode;
 mod rehearse;
 mod rig;
 mod rotator;
+mod runs;
+mod schedule;
 mod serve;
 mod shell;
 mod sky;
@@ -83,11 +86,15 @@ pub enum Command {
     /// Elements: give them, list them, fetch them, check a file, make some before launch
     #[command(subcommand)]
     Elements(elements::Elements),
-    /// Plans: what to do in a pass. Begin one, check one
+    /// Plans: what to do in a pass. Begin one, check it, hand it over, attach it, arm it
     #[command(subcommand)]
     Plan(plan::Plan),
     /// Send a plan through its coming pass many times in simulation, and tell what to expect
     Rehearse(rehearse::Rehearse),
+    /// Which plan gets which pass of the coming two days, and why
+    Schedule(schedule::Schedule),
+    /// What became of plans in passes, or the report of one
+    Runs(runs::Runs),
     /// The antenna's rotator by hand, through rotctld
     #[command(subcommand)]
     Rotator(rotator::Rotator),
@@ -136,6 +143,8 @@ impl Cli {
             Command::Key(key) => key.run(),
             Command::Plan(plan) => plan.run(),
             Command::Rehearse(rehearse) => rehearse.run(),
+            Command::Schedule(schedule) => schedule.run(),
+            Command::Runs(runs) => runs.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

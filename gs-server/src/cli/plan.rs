@@ -1,4 +1,4 @@
-//! `gs-server plan new|check`.
+//! `gs-server plan new|check`; the verbs that speak to a server are in `plans`.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -13,7 +13,7 @@ use radio::airtime::LinkTiming;
 use serde::Serialize;
 
 use super::shell::{print_json, print_line};
-use super::{Exit, Failure};
+use super::{Exit, Failure, plans};
 use crate::clock::SystemClock;
 use crate::config::{Config, station_config};
 use crate::plan::template::Template;
@@ -39,6 +39,20 @@ Examples:
 Nothing is sent, no server is asked. Each finding is one line, FILE:LINE:COLUMN, with the field and
 the remedy. Exit code 0 when there is no error (warnings may be there), 2 when there is one.")]
     Check(Check),
+    /// Hand a plan to the running server; one of the same name is withdrawn
+    Add(plans::Add),
+    /// Show the plans in use: armed or not, and the passes they are attached to
+    List(plans::List),
+    /// Let a plan run in its passes
+    Arm(plans::Arm),
+    /// Do not let a plan run any more; a run that lasts is stopped
+    Disarm(plans::Disarm),
+    /// Choose a pass for a plan
+    Attach(plans::Attach),
+    /// Take the choice of a pass back
+    Detach(plans::Detach),
+    /// Take a plan out of use; a run that lasts is stopped
+    Withdraw(plans::Withdraw),
 }
 
 /// `gs-server plan new`.
@@ -93,6 +107,13 @@ impl Plan {
         match self {
             Self::New(new) => new.run(),
             Self::Check(check) => check.run(),
+            Self::Add(verb) => verb.run(),
+            Self::List(verb) => verb.run(),
+            Self::Arm(verb) => verb.run(),
+            Self::Disarm(verb) => verb.run(),
+            Self::Attach(verb) => verb.run(),
+            Self::Detach(verb) => verb.run(),
+            Self::Withdraw(verb) => verb.run(),
         }
     }
 }
@@ -119,23 +140,14 @@ impl Check {
         let name = self.file.display().to_string();
         let text = read(&self.file, &name)?;
         let form = Form::of(&text);
-        let link = self.config.as_deref().map(ConfiguredLinks::load).transpose()?;
+        let links = self.config.as_deref().map(ConfiguredLinks::load).transpose()?;
         let mut context = CheckContext {
             timing: LinkTiming::default(),
             profile: None,
             pass: self.pass_shape()?,
             now: Some(self.at.map_or_else(|| SystemClock::new().now().utc, |time| UtcUs(time.unix_us()))),
         };
-        let mut checked = check_text(&text, form, &context);
-        if let (Some(links), Some(plan)) = (&link, &checked.plan) {
-            match links.of(&plan.satellite) {
-                Some((profile, timing)) => {
-                    (context.profile, context.timing) = (Some(profile), timing);
-                    checked = check_text(&text, form, &context);
-                }
-                None => checked.findings.push(unknown_satellite(&plan.satellite)),
-            }
-        }
+        let checked = check_for(&text, form, &mut context, links.as_ref());
         self.tell(&name, &checked, &context.timing)
     }
 
@@ -191,6 +203,26 @@ impl Check {
     }
 }
 
+/// The check with airtime and profile of the satellite that the plan names.
+pub(super) fn check_for(
+    text: &str,
+    form: Form,
+    context: &mut CheckContext,
+    links: Option<&ConfiguredLinks>,
+) -> CheckedText {
+    let mut checked = check_text(text, form, context);
+    if let (Some(links), Some(plan)) = (links, &checked.plan) {
+        match links.of(&plan.satellite) {
+            Some((profile, timing)) => {
+                (context.profile, context.timing) = (Some(profile), timing);
+                checked = check_text(text, form, context);
+            }
+            None => checked.findings.push(unknown_satellite(&plan.satellite)),
+        }
+    }
+    checked
+}
+
 /// The text of a plan, from a file or standard input.
 pub(super) fn read(file: &Path, name: &str) -> Result<String, Failure> {
     let mut text = String::new();
@@ -222,7 +254,11 @@ impl ConfiguredLinks {
     pub(super) fn load(path: &Path) -> Result<Self, Failure> {
         let config = Config::load(path).map_err(Failure::usage)?;
         config.check().map_err(Failure::usage)?;
-        let station = station_config(&config, &Default::default()).map_err(Failure::usage)?;
+        Self::of_config(&config)
+    }
+
+    pub(super) fn of_config(config: &Config) -> Result<Self, Failure> {
+        let station = station_config(config, &Default::default()).map_err(Failure::usage)?;
         let links = station.satellites.iter().filter_map(|satellite| {
             let link = station.links.iter().find(|link| link.satellite == satellite.id && !link.receive_only);
             let link = link.or_else(|| station.links.iter().find(|link| link.satellite == satellite.id));

@@ -3,9 +3,11 @@
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::time::Duration;
 
-use api::{ElementsAdded, ElementsRequest, ElementsSource, FetchReport, HeldElements, Page, Problem};
+use api::{
+    ElementsAdded, ElementsRequest, ElementsSource, FetchReport, HeldElements, Outcome, Page, Problem,
+};
 use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderValue};
-use reqwest::{Client, RequestBuilder, Url};
+use reqwest::{Client, Method, RequestBuilder, Url};
 use serde::de::DeserializeOwned;
 use tle::Elements;
 use tle::formats::{Form, write};
@@ -151,12 +153,54 @@ impl Remote {
         self.post("elements/fetch", &api::Nothing {}, FETCH_PATIENCE).await
     }
 
+    /// Anything that can be read.
+    ///
+    /// # Errors
+    /// [`RemoteError`].
+    pub async fn get<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        query: &[(&str, String)],
+    ) -> Result<T, RemoteError> {
+        let mut url = self.url(path)?;
+        for (name, value) in query {
+            url.query_pairs_mut().append_pair(name, value);
+        }
+        self.send(self.client.get(url.clone()), &url).await
+    }
+
+    /// Anything that can be written, under a key of its own.
+    ///
+    /// # Errors
+    /// [`RemoteError`].
+    pub async fn write(&self, path: &str, body: &impl serde::Serialize) -> Result<Outcome, RemoteError> {
+        self.ask(Method::POST, path, body, PATIENCE).await
+    }
+
+    /// Takes something back.
+    ///
+    /// # Errors
+    /// [`RemoteError`].
+    pub async fn remove(&self, path: &str) -> Result<Outcome, RemoteError> {
+        self.ask(Method::DELETE, path, &api::Nothing {}, PATIENCE).await
+    }
+
     fn url(&self, path: &str) -> Result<Url, RemoteError> {
         self.base.join(path).map_err(|error| RemoteError::Client(error.to_string()))
     }
 
     async fn post<T: DeserializeOwned>(
         &self,
+        path: &str,
+        body: &impl serde::Serialize,
+        patience: Duration,
+    ) -> Result<T, RemoteError> {
+        self.ask(Method::POST, path, body, patience).await
+    }
+
+    async fn ask<T: DeserializeOwned>(
+        &self,
+        method: Method,
         path: &str,
         body: &impl serde::Serialize,
         patience: Duration,
@@ -168,7 +212,7 @@ impl Remote {
         let body = serde_json::to_vec(body).map_err(|error| RemoteError::Client(error.to_string()))?;
         let request = self
             .client
-            .post(url.clone())
+            .request(method, url.clone())
             .timeout(patience)
             .header(AUTHORIZATION, bearer)
             .header(CONTENT_TYPE, "application/json")

@@ -14,7 +14,7 @@ use super::extract::{Id, Query, number, page, paged, satellite, scope, small, ti
 use super::problem::Failure;
 use super::write::Write;
 use crate::plan::condition_of;
-use crate::storage::{CommandQuery, CommandRow, StageRow};
+use crate::storage::{CommandLife, CommandQuery, CommandRow, StageRow};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -49,9 +49,14 @@ pub(super) async fn list(
 pub(super) async fn get(State(app): State<App>, id: Id) -> Result<Json<CommandView>, Failure> {
     let life = app.state.store.command(id.row()).await?;
     let life = life.ok_or_else(|| Failure::no_such("command", id.0))?;
+    whole_life(&life).map(Json)
+}
+
+/// A command with all its stages.
+pub(super) fn whole_life(life: &CommandLife) -> Result<CommandView, Failure> {
     let mut command = view(&life.command, life.stages.last())?;
     command.stages = Some(life.stages.iter().map(stage_view).collect());
-    Ok(Json(command))
+    Ok(command)
 }
 
 pub(super) async fn create(
@@ -81,15 +86,12 @@ fn intent(app: &App, request: &CommandRequest) -> Result<CommandIntent, Failure>
     if request.attempts == Some(0) {
         return Err(Failure::field(ProblemKind::BadArgument, "attempts", "must be at least 1, or null"));
     }
-    let when =
-        request.when.as_ref().map(|when| condition_of("when", when)).transpose().map_err(|findings| {
-            let told: Vec<String> = findings.iter().map(ToString::to_string).collect();
-            let problem = Problem::new(ProblemKind::BadArgument, told.join("; "));
-            let field = |problem: Problem, finding: &mission::plan::Finding| {
-                problem.with_field(finding.place.clone(), finding.problem.clone())
-            };
-            Failure(Box::new(findings.iter().fold(problem, field)))
-        })?;
+    let when = request
+        .when
+        .as_ref()
+        .map(|when| condition_of("when", when))
+        .transpose()
+        .map_err(|findings| Failure::findings(ProblemKind::BadArgument, &findings))?;
     Ok(CommandIntent {
         satellite: satellite(app, request.satellite.as_deref())?,
         link: request.link.as_deref().map(link).transpose()?,

@@ -44,7 +44,7 @@ pub(super) async fn cancel(
     write.submit(&app, Intent::CancelDownload(DownloadId(id.0))).await
 }
 
-fn view(row: DownloadRow) -> DownloadView {
+pub(super) fn view(row: DownloadRow) -> DownloadView {
     DownloadView {
         id: number(row.id),
         satellite: row.satellite,

@@ -22,8 +22,11 @@ mod images;
 mod keys;
 mod links;
 mod page;
+mod plans;
 mod problem;
 mod routes;
+mod runs;
+mod schedule;
 mod sky;
 mod station;
 mod status;
@@ -41,8 +44,9 @@ use std::sync::Arc;
 use axum::Router;
 use axum::middleware::from_fn_with_state;
 use axum::serve::ListenerExt as _;
-use mission::{SatelliteId, Site, StationConfig, StationId};
+use mission::{Profile, SatelliteId, Site, StationConfig, StationId};
 use protocol::KeyId;
+use radio::airtime::LinkTiming;
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 use tower_http::compression::CompressionLayer;
@@ -110,6 +114,10 @@ pub struct SatelliteIdentity {
     pub key: Option<KeyId>,
     /// Microseconds between two of its heartbeats.
     pub heartbeat_period_us: i64,
+    /// What it knows.
+    pub profile: Profile,
+    /// Airtime of its first link.
+    pub timing: LinkTiming,
 }
 
 impl Identity {
@@ -120,6 +128,13 @@ impl Identity {
             id: satellite.id.clone(),
             key: satellite.key.as_ref().map(protocol::Key::id),
             heartbeat_period_us: i64::try_from(satellite.profile.heartbeat_period_us).unwrap_or(i64::MAX),
+            profile: satellite.profile,
+            timing: config
+                .links
+                .iter()
+                .find(|link| link.satellite == satellite.id)
+                .map(|link| link.timing)
+                .unwrap_or_default(),
         });
         Self {
             station: config.station.clone(),

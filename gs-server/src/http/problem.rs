@@ -4,6 +4,7 @@ use api::{Problem, ProblemKind};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use mission::Refusal;
+use mission::plan::Finding;
 
 use crate::engine::IntentError;
 use crate::storage::StoreError;
@@ -22,6 +23,16 @@ impl Failure {
     pub(super) fn field(kind: ProblemKind, field: impl Into<String>, message: impl Into<String>) -> Self {
         let (field, message) = (field.into(), message.into());
         Self(Box::new(Problem::new(kind, format!("{field}: {message}")).with_field(field, message)))
+    }
+
+    /// Everything that is wrong with a plan or a condition, each with its place and remedy.
+    pub(super) fn findings(kind: ProblemKind, findings: &[Finding]) -> Self {
+        let told: Vec<String> = findings.iter().map(ToString::to_string).collect();
+        let problem = Problem::new(kind, told.join("; "));
+        let field = |problem: Problem, finding: &Finding| {
+            problem.with_field(finding.place.clone(), format!("{}. {}", finding.problem, finding.remedy))
+        };
+        Self(Box::new(findings.iter().fold(problem, field)))
     }
 
     /// Nothing under this number.

@@ -3,12 +3,12 @@
 use axum::Router;
 use axum::handler::Handler;
 use axum::middleware::from_fn_with_state;
-use axum::routing::{MethodRouter, get, post};
+use axum::routing::{MethodRouter, delete, get, post};
 
 use super::write::guard_write;
 use super::{
-    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, page, sky,
-    station, status, stream, telemetry,
+    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, page, plans,
+    runs, schedule, sky, station, status, stream, telemetry,
 };
 
 /// What a path is for.
@@ -18,6 +18,8 @@ pub(super) enum Access {
     Read,
     /// Everything of [`guard_write`].
     Write,
+    /// The same by DELETE.
+    Remove,
     /// WebSocket: origin checked, no token.
     Stream,
 }
@@ -32,7 +34,9 @@ pub(super) struct Route {
 impl Route {
     pub(super) fn add_to(self, router: Router<App>, app: &App) -> Router<App> {
         let handler = match self.access {
-            Access::Write => self.handler.route_layer(from_fn_with_state(app.clone(), guard_write)),
+            Access::Write | Access::Remove => {
+                self.handler.route_layer(from_fn_with_state(app.clone(), guard_write))
+            }
             Access::Read | Access::Stream => self.handler,
         };
         router.route(self.path, handler)
@@ -45,6 +49,10 @@ fn read<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route
 
 fn write<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route {
     Route { path, access: Access::Write, handler: post(handler) }
+}
+
+fn remove<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route {
+    Route { path, access: Access::Remove, handler: delete(handler) }
 }
 
 fn stream<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route {
@@ -88,6 +96,18 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/passes/timeline.svg", sky::timeline),
         read("/api/v1/passes.ics", sky::calendar),
         read("/api/v1/look", sky::look),
+        read("/api/v1/plans", plans::list),
+        write("/api/v1/plans", plans::add),
+        remove("/api/v1/plans/{name}", plans::withdraw),
+        write("/api/v1/plans/{name}/arm", plans::arm),
+        write("/api/v1/plans/{name}/disarm", plans::disarm),
+        write("/api/v1/plans/{name}/attach", plans::attach),
+        write("/api/v1/plans/{name}/detach", plans::detach),
+        read("/api/v1/schedule", schedule::get),
+        read("/api/v1/runs", runs::list),
+        read("/api/v1/runs/{id}", runs::get),
+        write("/api/v1/satellites/{name}/hold", plans::hold),
+        write("/api/v1/satellites/{name}/release", plans::release),
         read("/api/v1/events", events::list),
         read("/api/v1/limits", events::limits),
         read("/api/v1/audit", events::audit),

@@ -44,7 +44,7 @@ use crate::witness::WitnessFolder;
 pub use error::StoreError;
 pub use read::{
     Bucket, ChunkState, CommandLife, CommandNow, CommandQuery, Counts, EventQuery, FrameQuery, Heard,
-    ImageBytes, ImageMap, LatestValue, Page, Sample, Samples, Scope, Series, TelemetryQuery,
+    HeardCounts, ImageBytes, ImageMap, LatestValue, Page, Sample, Samples, Scope, Series, TelemetryQuery,
 };
 pub use redecode::{RedecodeProgress, RedecodeReport};
 pub use rows::{

@@ -51,14 +51,14 @@ impl Elements {
 
 /// The configuration of the station that is meant.
 #[derive(Debug, Args)]
-struct Of {
+pub(super) struct Of {
     /// The configuration of the station
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
 }
 
 impl Of {
-    fn load(&self) -> Result<Config, Failure> {
+    pub(super) fn load(&self) -> Result<Config, Failure> {
         load(&self.config)
     }
 }

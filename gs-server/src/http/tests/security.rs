@@ -10,6 +10,8 @@ use super::{Bench, HOST, TOKEN, request, write};
 fn concrete(path: &str) -> String {
     path.replace("/links/{id}", "/links/e22")
         .replace("/keys/{id}", "/keys/00000000")
+        .replace("/satellites/{name}", "/satellites/pixelsat-1")
+        .replace("{name}", "status")
         .replace("{file}", "main.js")
         .replace("{id}", "1")
 }

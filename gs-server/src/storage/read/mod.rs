@@ -14,6 +14,7 @@ pub use commands::{CommandLife, CommandNow, CommandQuery};
 pub use events::{Counts, EventQuery};
 pub use frames::{FrameQuery, Heard};
 pub use images::{ChunkState, ImageBytes, ImageMap};
+pub use plans::HeardCounts;
 pub use telemetry::{Bucket, LatestValue, Sample, Samples, Series, TelemetryQuery};
 
 pub(super) use events::find_intent;
