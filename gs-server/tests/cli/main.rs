@@ -9,6 +9,7 @@
 mod files;
 mod help;
 mod plan;
+mod plans;
 mod radio;
 mod rehearse;
 mod twin;

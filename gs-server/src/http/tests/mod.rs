@@ -2,6 +2,7 @@
 
 mod elements;
 mod page;
+mod plans;
 mod reads;
 mod security;
 mod sky;
@@ -146,6 +147,12 @@ impl Bench {
 
     async fn post(&self, path: &str, key: &str, body: &Value) -> Answer {
         self.send(write(path, key).body(Body::from(body.to_string())).unwrap()).await
+    }
+
+    async fn delete(&self, path: &str, key: &str) -> Answer {
+        let mut request = write(path, key).body(Body::empty()).unwrap();
+        *request.method_mut() = Method::DELETE;
+        self.send(request).await
     }
 
     /// Bytes as a radio hands them over.

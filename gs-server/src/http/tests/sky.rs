@@ -39,7 +39,7 @@ async fn with_place() -> Bench {
 }
 
 /// With elements from an hour ago.
-async fn with_elements() -> Bench {
+pub(super) async fn with_elements() -> Bench {
     let bench = with_place().await;
     let now = bench.timer.now().utc.0;
     let added = bench.post("/api/v1/elements", "e", &json!({"text": omm(now - HOUR_US)})).await.ok();
