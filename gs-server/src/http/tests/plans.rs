@@ -193,9 +193,9 @@ async fn a_chosen_pass_stands_in_the_schedule_with_plan_and_reason() {
     assert_eq!((&run["aos"], &run["started_at"]), (&contact["start"], &Value::Null));
     bench.until("/api/v1/schedule", "/contacts/0/armed", &json!(true)).await;
 
-    bench.post("/api/v1/plans/status/detach", "e", &json!({"at": pass["tca"]})).await.ok();
+    bench.post("/api/v1/plans/status/detach", "back", &json!({"at": pass["tca"]})).await.ok();
     bench.until("/api/v1/schedule", "/contacts", &json!([])).await;
-    let gone = bench.post("/api/v1/plans/status/detach", "f", &json!({"at": pass["tca"]})).await;
+    let gone = bench.post("/api/v1/plans/status/detach", "again", &json!({"at": pass["tca"]})).await;
     assert_eq!(gone.problem(), "pass-refused");
     bench.until("/api/v1/runs", "/items/0/state", &json!("dropped")).await;
     assert!(bench.get("/api/v1/runs").await.ok()["items"][0]["why"].is_string());
