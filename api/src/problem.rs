@@ -111,8 +111,32 @@ kinds! {
     HostRefused 421 "host-refused" "This server does not answer under that name";
     /// A page of somebody else asks.
     OriginRefused 403 "origin-refused" "Pages of another origin may not do this";
-    /// No token came.
-    TokenRequired 401 "token-required" "A token is required to change anything";
+    /// Nobody is logged in, and no token came.
+    LoginRequired 401 "login-required" "Log in, or send a token";
+    /// Who asks lacks the right.
+    Forbidden 403 "forbidden" "This needs a right that is missing";
+    /// A write by a page without the session's own word.
+    Csrf 403 "csrf" "The request does not come from this session's page";
+    /// The session's cookie was exchanged for a newer one: somebody holds a copy.
+    SessionReplayed 401 "session-replayed" "This session's cookie was used before it was exchanged";
+    /// Name and password do not go together.
+    WrongPassword 401 "wrong-password" "Name and password do not go together";
+    /// A password that is too short or too long.
+    BadPassword 422 "bad-password" "The password cannot be used";
+    /// A one-time link that was used, is too old, or never was.
+    LinkRefused 410 "link-refused" "This link does not open anything any more";
+    /// Too many attempts.
+    RateLimited 429 "rate-limited" "Too many attempts";
+    /// No such user.
+    UnknownUser 404 "unknown-user" "There is no such user";
+    /// The user is there already.
+    UserExists 409 "user-exists" "The name is taken";
+    /// Without an administrator nobody could let anybody in.
+    LastAdministrator 409 "last-administrator" "Somebody must stay administrator";
+    /// Another person has to say yes first.
+    ApprovalNeeded 409 "approval-needed" "Another person has to approve this";
+    /// This approval cannot be given.
+    ApprovalRefused 409 "approval-refused" "This cannot be approved like that";
     /// The token is another.
     TokenRefused 401 "token-refused" "The token is not the right one";
     /// A write without idempotency key.

@@ -17,6 +17,7 @@
 //! | [`keys`], [`decode`] | key files; captures to JSON |
 //! | [`twin`], [`demo`] | the simulated satellite behind a real port; a pass with everything real but the satellite |
 //! | [`plan`] | plans as text: read, checked, templates |
+//! | [`people`] | who may do what |
 //! | `pointing` | whom the antenna follows, by the schedule |
 //! | [`cli`] | the command line, a file per verb |
 //!
@@ -36,6 +37,7 @@ pub mod hub;
 pub mod keys;
 pub mod lifecycle;
 pub mod links;
+pub mod people;
 pub mod plan;
 mod pointing;
 pub mod run;

@@ -122,7 +122,7 @@ fn elements_are_added_and_listed_without_a_server_and_beside_one_by_the_same_roa
     let beside = json(elements(&folder, "list", &["--json"]));
     assert_eq!(beside["elements"].as_array().expect("a list").len(), 2);
     assert_eq!(beside["elements"][0]["source"], "file second.json");
-    assert_eq!(beside["elements"][0]["added_by"], "operator");
+    assert_eq!(beside["elements"][0]["added_by"], "local");
     let events = server.client.get("/api/v1/events?limit=1000").expect("an answer").text();
     assert!(events.contains("file second.json"), "{events}");
     server.stop();

@@ -345,11 +345,8 @@ fn acknowledged_exists_once(client: &Client, operator: &Operator, commands: &BTr
     let ids: Vec<u64> = operator.acknowledged.values().filter_map(|said| said.outcome.command).collect();
     let distinct: BTreeSet<u64> = ids.iter().copied().collect();
     assert_eq!(distinct.len(), ids.len(), "two intents became one command");
-    let theirs: BTreeSet<u64> = commands
-        .values()
-        .filter(|command| command.principal == "operator")
-        .map(|command| command.id)
-        .collect();
+    let theirs: BTreeSet<u64> =
+        commands.values().filter(|command| command.principal == "local").map(|command| command.id).collect();
     // The one that was under way when the operator went home may be there without an answer.
     let unanswered: Vec<u64> = theirs.difference(&distinct).copied().collect();
     assert!(unanswered.len() <= 1, "commands that nobody asked for, or twice: {unanswered:?}");

@@ -1,13 +1,14 @@
 //! API v1 and the first page, under axum.
 //!
-//! `routes` is the table: every path, whether it reads or writes, and who answers. Around all of it lies one guard
-//! (names under which we answer, problems, security headers), around every write another (origin, token, idempotency
-//! key, JSON). One file per group of operations; `problem` is the only place that turns errors into answers.
+//! `routes` is the table: every path, whether it reads or writes, who may take it, and who answers. Around all of it lies
+//! one guard (names under which we answer, problems, security headers), around every route its door (`admit`: origin, who
+//! asks, the right), around every write another (idempotency key, JSON). One file per group of operations; `problem` is the only place that turns errors into answers.
 //!
-//! Reading needs no token: whoever can reach the port may look. Every write needs the token, on loopback too.
+//! Reading needs no token: whoever can reach the port may look. Every write needs a right.
 //!
 //! What it does **not** do: decide anything (intents go to the engine), know SQL (the store answers), read a clock.
 
+mod admit;
 mod antenna;
 mod clock;
 mod commands;

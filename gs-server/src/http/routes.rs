@@ -1,26 +1,31 @@
-//! The table of all paths. Tests walk it, so a new write is tried without token, key, origin and the rest by itself.
+//! The table of all paths, each with who may take it: a row without a [`Policy`] does not compile.
+//!
+//! Tests walk it, so a new write is tried without token, key, origin and the rest by itself.
 
 use axum::Router;
 use axum::handler::Handler;
-use axum::middleware::from_fn_with_state;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{MethodRouter, delete, get, post};
 
+use super::admit::Policy::{Anyone, Needs};
+use super::admit::{Policy, admit};
 use super::write::guard_write;
 use super::{
     App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, page, plans,
     runs, schedule, sky, station, status, stream, telemetry,
 };
+use crate::people::Right::{Command, Look, ManageStation, Plan};
 
 /// What a path is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Access {
-    /// Changes nothing; no token.
+    /// Changes nothing.
     Read,
-    /// Everything of [`guard_write`].
+    /// The origin checked, and everything of [`guard_write`].
     Write,
     /// The same by DELETE.
     Remove,
-    /// WebSocket: origin checked, no token.
+    /// WebSocket: the origin checked.
     Stream,
 }
 
@@ -28,93 +33,93 @@ pub(super) enum Access {
 pub(super) struct Route {
     pub(super) path: &'static str,
     pub(super) access: Access,
+    pub(super) policy: Policy,
     handler: MethodRouter<App>,
 }
 
 impl Route {
     pub(super) fn add_to(self, router: Router<App>, app: &App) -> Router<App> {
         let handler = match self.access {
-            Access::Write | Access::Remove => {
-                self.handler.route_layer(from_fn_with_state(app.clone(), guard_write))
-            }
+            Access::Write | Access::Remove => self.handler.route_layer(from_fn(guard_write)),
             Access::Read | Access::Stream => self.handler,
         };
-        router.route(self.path, handler)
+        let door = (app.clone(), self.policy, self.access);
+        router.route(self.path, handler.route_layer(from_fn_with_state(door, admit)))
     }
 }
 
-fn read<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route {
-    Route { path, access: Access::Read, handler: get(handler) }
+fn read<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, handler: H) -> Route {
+    Route { path, access: Access::Read, policy, handler: get(handler) }
 }
 
-fn write<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route {
-    Route { path, access: Access::Write, handler: post(handler) }
+fn write<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, handler: H) -> Route {
+    Route { path, access: Access::Write, policy, handler: post(handler) }
 }
 
-fn remove<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route {
-    Route { path, access: Access::Remove, handler: delete(handler) }
+fn remove<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, handler: H) -> Route {
+    Route { path, access: Access::Remove, policy, handler: delete(handler) }
 }
 
-fn stream<T: 'static, H: Handler<T, App>>(path: &'static str, handler: H) -> Route {
-    Route { path, access: Access::Stream, handler: get(handler) }
+fn stream<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, handler: H) -> Route {
+    Route { path, access: Access::Stream, policy, handler: get(handler) }
 }
 
-/// Every path of the server.
+/// Every path of the server, and who may take it.
 pub(super) fn table() -> Vec<Route> {
     vec![
-        read("/", page::index),
-        read("/favicon.ico", page::favicon),
-        read("/page/{file}", page::file),
-        read("/api/v1/health", status::health),
-        read("/api/v1/version", status::version),
-        read("/api/v1/station", station::get),
-        read("/api/v1/antenna", antenna::get),
-        read("/api/v1/frames", frames::list),
-        read("/api/v1/frames/{id}", frames::get),
-        read("/api/v1/telemetry", telemetry::series),
-        read("/api/v1/telemetry/latest", telemetry::latest),
-        read("/api/v1/parameters", telemetry::parameters),
-        read("/api/v1/commands", commands::list),
-        write("/api/v1/commands", commands::create),
-        read("/api/v1/commands/{id}", commands::get),
-        write("/api/v1/commands/{id}/cancel", commands::cancel),
-        read("/api/v1/downloads", downloads::list),
-        write("/api/v1/downloads", downloads::create),
-        read("/api/v1/downloads/{id}", downloads::get),
-        write("/api/v1/downloads/{id}/cancel", downloads::cancel),
-        read("/api/v1/images", images::list),
-        read("/api/v1/images/{id}", images::get),
-        read("/api/v1/images/{id}/chunks", images::chunks),
-        read("/api/v1/images/{id}/file", images::file),
-        read("/api/v1/elements", elements::list),
-        write("/api/v1/elements", elements::add),
-        read("/api/v1/elements/sources", elements::sources),
-        write("/api/v1/elements/fetch", elements::fetch),
-        read("/api/v1/passes", sky::passes),
-        read("/api/v1/passes/history", sky::history),
-        read("/api/v1/passes/sky.svg", sky::sky),
-        read("/api/v1/passes/timeline.svg", sky::timeline),
-        read("/api/v1/passes.ics", sky::calendar),
-        read("/api/v1/look", sky::look),
-        read("/api/v1/plans", plans::list),
-        write("/api/v1/plans", plans::add),
-        remove("/api/v1/plans/{name}", plans::withdraw),
-        write("/api/v1/plans/{name}/arm", plans::arm),
-        write("/api/v1/plans/{name}/disarm", plans::disarm),
-        write("/api/v1/plans/{name}/attach", plans::attach),
-        write("/api/v1/plans/{name}/detach", plans::detach),
-        read("/api/v1/schedule", schedule::get),
-        read("/api/v1/runs", runs::list),
-        read("/api/v1/runs/{id}", runs::get),
-        write("/api/v1/satellites/{name}/hold", plans::hold),
-        write("/api/v1/satellites/{name}/release", plans::release),
-        read("/api/v1/events", events::list),
-        read("/api/v1/limits", events::limits),
-        read("/api/v1/audit", events::audit),
-        write("/api/v1/links/{id}/arm", links::arm),
-        write("/api/v1/links/{id}/disarm", links::disarm),
-        write("/api/v1/clock/vouch", clock::vouch),
-        write("/api/v1/keys/{id}/confirm-counter", keys::confirm_counter),
-        stream("/api/v1/stream", stream::open),
+        read("/", Anyone, page::index),
+        read("/favicon.ico", Anyone, page::favicon),
+        read("/page/{file}", Anyone, page::file),
+        read("/api/v1/health", Anyone, status::health),
+        read("/api/v1/version", Needs(Look), status::version),
+        read("/api/v1/station", Needs(Look), station::get),
+        read("/api/v1/antenna", Needs(Look), antenna::get),
+        read("/api/v1/frames", Needs(Look), frames::list),
+        read("/api/v1/frames/{id}", Needs(Look), frames::get),
+        read("/api/v1/telemetry", Needs(Look), telemetry::series),
+        read("/api/v1/telemetry/latest", Needs(Look), telemetry::latest),
+        read("/api/v1/parameters", Needs(Look), telemetry::parameters),
+        read("/api/v1/commands", Needs(Look), commands::list),
+        write("/api/v1/commands", Needs(Command), commands::create),
+        read("/api/v1/commands/{id}", Needs(Look), commands::get),
+        write("/api/v1/commands/{id}/cancel", Needs(Command), commands::cancel),
+        read("/api/v1/downloads", Needs(Look), downloads::list),
+        write("/api/v1/downloads", Needs(Command), downloads::create),
+        read("/api/v1/downloads/{id}", Needs(Look), downloads::get),
+        write("/api/v1/downloads/{id}/cancel", Needs(Command), downloads::cancel),
+        read("/api/v1/images", Needs(Look), images::list),
+        read("/api/v1/images/{id}", Needs(Look), images::get),
+        read("/api/v1/images/{id}/chunks", Needs(Look), images::chunks),
+        read("/api/v1/images/{id}/file", Needs(Look), images::file),
+        read("/api/v1/elements", Needs(Look), elements::list),
+        write("/api/v1/elements", Needs(Plan), elements::add),
+        read("/api/v1/elements/sources", Needs(Look), elements::sources),
+        write("/api/v1/elements/fetch", Needs(Plan), elements::fetch),
+        read("/api/v1/passes", Needs(Look), sky::passes),
+        read("/api/v1/passes/history", Needs(Look), sky::history),
+        read("/api/v1/passes/sky.svg", Needs(Look), sky::sky),
+        read("/api/v1/passes/timeline.svg", Needs(Look), sky::timeline),
+        read("/api/v1/passes.ics", Needs(Look), sky::calendar),
+        read("/api/v1/look", Needs(Look), sky::look),
+        read("/api/v1/plans", Needs(Look), plans::list),
+        write("/api/v1/plans", Needs(Plan), plans::add),
+        remove("/api/v1/plans/{name}", Needs(Plan), plans::withdraw),
+        write("/api/v1/plans/{name}/arm", Needs(Plan), plans::arm),
+        write("/api/v1/plans/{name}/disarm", Needs(Plan), plans::disarm),
+        write("/api/v1/plans/{name}/attach", Needs(Plan), plans::attach),
+        write("/api/v1/plans/{name}/detach", Needs(Plan), plans::detach),
+        read("/api/v1/schedule", Needs(Look), schedule::get),
+        read("/api/v1/runs", Needs(Look), runs::list),
+        read("/api/v1/runs/{id}", Needs(Look), runs::get),
+        write("/api/v1/satellites/{name}/hold", Needs(Command), plans::hold),
+        write("/api/v1/satellites/{name}/release", Needs(Command), plans::release),
+        read("/api/v1/events", Needs(Look), events::list),
+        read("/api/v1/limits", Needs(Look), events::limits),
+        read("/api/v1/audit", Needs(Look), events::audit),
+        write("/api/v1/links/{id}/arm", Needs(Command), links::arm),
+        write("/api/v1/links/{id}/disarm", Needs(Command), links::disarm),
+        write("/api/v1/clock/vouch", Needs(Command), clock::vouch),
+        write("/api/v1/keys/{id}/confirm-counter", Needs(ManageStation), keys::confirm_counter),
+        stream("/api/v1/stream", Needs(Look), stream::open),
     ]
 }

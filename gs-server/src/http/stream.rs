@@ -14,14 +14,12 @@ use axum::extract::ws::{
     CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade, close_code,
     rejection::WebSocketUpgradeRejection,
 };
-use axum::http::HeaderMap;
 use axum::response::Response;
 use serde::Deserialize;
 use tokio::sync::broadcast::{self, error::RecvError};
 
 use super::App;
 use super::extract::Query;
-use super::guard::check_origin;
 use super::problem::Failure;
 use super::{events, station};
 use crate::clock::{wall_sleep, within};
@@ -52,11 +50,8 @@ pub(super) struct Asked {
 pub(super) async fn open(
     State(app): State<App>,
     Query(asked): Query<Asked>,
-    headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Failure> {
-    // Browsers do not apply the same-origin rule to WebSockets: we must.
-    check_origin(&headers)?;
     let upgrade = upgrade.map_err(|_| {
         Failure::new(ProblemKind::UpgradeRequired, "Open this path as a WebSocket (ws:// or wss://).")
     })?;

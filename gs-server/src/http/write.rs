@@ -1,4 +1,5 @@
-//! What every write passes, in this order: origin, token, idempotency key, media type, size, JSON, shape.
+//! What every write passes behind the door ([`super::admit`]), in this order: idempotency key, media type, size, JSON,
+//! shape.
 //!
 //! [`guard_write`] lies around every route that the table declares as a write, so a new one cannot forget it; the
 //! [`Write`] extractor only works behind it.
@@ -6,7 +7,7 @@
 use api::{Outcome, OutcomeWord, Problem, ProblemKind};
 use axum::Json;
 use axum::body::to_bytes;
-use axum::extract::{FromRequestParts, Request, State};
+use axum::extract::{FromRequestParts, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
@@ -17,7 +18,7 @@ use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
 use super::App;
-use super::guard::check_origin;
+use super::admit::Caller;
 use super::problem::Failure;
 
 /// Bytes that a body may have.
@@ -38,17 +39,19 @@ struct Checked {
 }
 
 /// Around every write.
-pub(super) async fn guard_write(State(app): State<App>, request: Request, next: Next) -> Response {
-    match check(&app, request).await {
+pub(super) async fn guard_write(request: Request, next: Next) -> Response {
+    match check(request).await {
         Ok(request) => next.run(request).await,
         Err(failure) => failure.into_response(),
     }
 }
 
-async fn check(app: &App, request: Request) -> Result<Request, Failure> {
+async fn check(request: Request) -> Result<Request, Failure> {
     let (mut parts, body) = request.into_parts();
-    check_origin(&parts.headers)?;
-    check_token(app, &parts.headers)?;
+    let caller = parts.extensions.get::<Caller>().and_then(|caller| caller.principal.clone());
+    let principal = caller.ok_or_else(|| {
+        Failure::new(ProblemKind::LoginRequired, "Nobody is named as the one who asks: log in at /login.")
+    })?;
     let idempotency_key = idempotency_key(&parts.headers)?;
     let declared = parts.headers.get(header::CONTENT_TYPE);
     let is_json = declared.and_then(|value| value.to_str().ok()).is_some_and(is_json);
@@ -64,32 +67,8 @@ async fn check(app: &App, request: Request) -> Result<Request, Failure> {
         false => serde_json::from_slice(&body)
             .map_err(|error| Failure::new(ProblemKind::BadJson, format!("The body is not JSON: {error}.")))?,
     };
-    parts.extensions.insert(Checked {
-        // There is one token, so there is one operator.
-        principal: Principal::new("operator"),
-        idempotency_key,
-        digest: digest(&parts, &body),
-        body,
-    });
+    parts.extensions.insert(Checked { principal, idempotency_key, digest: digest(&parts, &body), body });
     Ok(Request::from_parts(parts, axum::body::Body::empty()))
-}
-
-fn check_token(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
-    let given = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());
-    let bearer = given
-        .and_then(|value| value.split_once(' '))
-        .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
-    match bearer {
-        Some((_, token)) if app.state.token.matches(token.trim()) => Ok(()),
-        Some(_) => Err(Failure::new(
-            ProblemKind::TokenRefused,
-            "This is not the token of this server. It stands in its token file.",
-        )),
-        None => Err(Failure::new(
-            ProblemKind::TokenRequired,
-            "Send 'Authorization: Bearer TOKEN' with the token of the server's token file.",
-        )),
-    }
 }
 
 fn idempotency_key(headers: &HeaderMap) -> Result<String, Failure> {

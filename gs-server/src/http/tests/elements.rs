@@ -30,7 +30,7 @@ async fn elements_are_added_once_and_listed_with_who_and_whence() {
     assert_eq!(list["items"].as_array().unwrap().len(), 1);
     assert_eq!(
         (&held["source"], &held["added_by"], &held["in_use"]),
-        (&json!("test"), &json!("operator"), &json!(true))
+        (&json!("test"), &json!("local"), &json!(true))
     );
     assert_eq!(held["elements"]["norad_cat_id"], 25_544);
     assert!(held["age_days"].as_f64().unwrap() > 1000.0 && held["level"] == "distress", "{held}");

@@ -56,7 +56,7 @@ async fn a_plan_is_handed_over_armed_and_withdrawn() {
     let held = bench.get("/api/v1/plans").await.ok()["items"][0].clone();
     assert_eq!(
         (&held["id"], &held["armed"], &held["added_by"], &held["station"], &held["picks"]),
-        (&json!(1), &json!(false), &json!("operator"), &json!("bench"), &json!([]))
+        (&json!(1), &json!(false), &json!("local"), &json!("bench"), &json!([]))
     );
     assert_eq!(held["plan"]["steps"], status()["steps"]);
 

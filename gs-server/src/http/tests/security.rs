@@ -57,8 +57,8 @@ async fn every_write_is_refused_in_every_wrong_way() {
         let mut form = body(write(&path, "k"), "command=Ping");
         form.headers_mut().insert("content-type", "application/x-www-form-urlencoded".parse().unwrap());
         let cases = [
-            ("no token", without(&path, "authorization"), 401, "token-required"),
-            ("other scheme", with(&path, "authorization", &format!("Basic {TOKEN}")), 401, "token-required"),
+            ("no token", without(&path, "authorization"), 401, "login-required"),
+            ("other scheme", with(&path, "authorization", &format!("Basic {TOKEN}")), 401, "login-required"),
             (
                 "wrong token",
                 with(&path, "authorization", "Bearer 0123456789abcdef0123456789abcdee"),

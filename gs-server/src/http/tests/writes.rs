@@ -31,7 +31,7 @@ async fn a_command_is_queued_and_can_be_looked_at_and_withdrawn() {
         (&command["satellite"], &command["station"], &command["link"]),
         (&json!("pixelsat-1"), &json!("bench"), &json!("e22"))
     );
-    assert_eq!(command["principal"], "operator");
+    assert_eq!(command["principal"], "local");
     assert_eq!(command["key"].as_str().unwrap().len(), 8);
     assert_eq!(command["stages"][0]["stage"], "queued");
 
@@ -51,7 +51,7 @@ async fn the_audit_tells_who_did_what_page_by_page() {
     bench.post("/api/v1/commands/1/cancel", "b", &json!({})).await.ok();
     let newest = bench.get("/api/v1/audit?limit=1").await.ok();
     let row = &newest["items"][0];
-    assert_eq!((&row["who"], &row["action"]), (&json!("operator"), &json!("command.cancel")));
+    assert_eq!((&row["who"], &row["action"]), (&json!("local"), &json!("command.cancel")));
     assert_eq!((&row["station"], &row["detail"]), (&json!("bench"), &json!("command 1")));
     assert!(row["at"].as_str().unwrap().ends_with('Z'));
     let before = format!("/api/v1/audit?before={}", newest["next"]);
