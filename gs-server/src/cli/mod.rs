@@ -3,6 +3,7 @@
 //! What a script may read goes to standard output (with `--json` as one object, or one object a line); everything said
 //! to a person besides goes to standard error. Exit codes are those of [`Exit`], explained in `docs/cli.md`.
 
+mod audit;
 mod config;
 mod decode;
 mod demo;
@@ -104,6 +105,9 @@ pub enum Command {
     /// Make and list key files; their bytes are never printed
     #[command(subcommand)]
     Key(key::Key),
+    /// Who did what, and whether the record of it is whole
+    #[command(subcommand)]
+    Audit(audit::Audit),
     /// Derive every value again from the raw frames
     Redecode(redecode::Redecode),
 }
@@ -145,6 +149,7 @@ impl Cli {
             Command::Rehearse(rehearse) => rehearse.run(),
             Command::Schedule(schedule) => schedule.run(),
             Command::Runs(runs) => runs.run(),
+            Command::Audit(audit) => audit.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

@@ -8,10 +8,12 @@
 //! - `ground.sqlite3` with its `-wal` and `-shm`: the database;
 //! - `lock`: held while a server works here;
 //! - `reserve.bin`: raw frames while the database takes nothing, see [`reserve`];
+//! - `audit-head`: where the chain of the audit ends, see [`verify_audit`];
 //! - `witness/`: the highest counter of each key, outside the database, see [`crate::witness`].
 //!
 //! What it does **not** do: keep keys, know HTTP, delete anything that was heard or sent.
 
+mod audit_chain;
 mod convert;
 mod convert_plan;
 mod convert_sky;
@@ -41,6 +43,7 @@ use sqlx::sqlite::SqlitePool;
 
 use crate::witness::WitnessFolder;
 
+pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
 pub use error::StoreError;
 pub use read::{
     Bucket, ChunkState, CommandLife, CommandNow, CommandQuery, Counts, EventQuery, FrameQuery, Heard,
@@ -48,9 +51,9 @@ pub use read::{
 };
 pub use redecode::{RedecodeProgress, RedecodeReport};
 pub use rows::{
-    AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow,
-    FrameRow, ImageRow, IntentRow, LimitRow, MetaRow, ParameterRow, PassElementsRow, PassRow, PlanRow,
-    ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
+    AuditLinkRow, AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow,
+    EventRow, FrameRow, ImageRow, IntentRow, LimitRow, MetaRow, ParameterRow, PassElementsRow, PassRow,
+    PlanRow, ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 
 use reserve::{Reserve, ReserveError};
@@ -85,6 +88,7 @@ struct Inner {
     readers: SqlitePool,
     witness: WitnessFolder,
     reserve: Mutex<Option<Reserve>>,
+    audit_head: Arc<audit_chain::HeadFile>,
     // Last: the folder is free only when everything above is closed.
     _lock: lock::FolderLock,
 }
@@ -129,7 +133,13 @@ impl Store {
     /// [`StoreError::Full`] and [`StoreError::Io`] may pass: the next batch is tried afresh. [`StoreError::Conflict`]
     /// when the records contradict what is stored. Nothing of the batch is stored then.
     pub async fn apply(&self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
-        self.0.writer.lock().await.apply(batch).await
+        let (events, head) = self.0.writer.lock().await.apply(batch).await?;
+        if let Some(head) = head {
+            // Nobody waits for it: the chain itself is in the database.
+            let file = Arc::clone(&self.0.audit_head);
+            tokio::task::spawn_blocking(move || file.raise(head));
+        }
+        Ok(events)
     }
 
     /// What the engine needs to go on: of these satellites and keys, and the highest ids of everything.

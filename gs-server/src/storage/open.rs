@@ -11,6 +11,7 @@ use sqlx::migrate::MigrateError;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{AssertSqlSafe, Connection as _, SqliteConnection};
 
+use super::audit_chain::{self, HeadFile};
 use super::convert::parse;
 use super::lock::FolderLock;
 use super::reserve::{Reserve, ReserveError};
@@ -50,13 +51,14 @@ pub(super) async fn open(options: StoreOptions) -> Result<Store, StoreError> {
     refuse_newer(&mut connection).await?;
     check_schema(&mut connection, &options).await?;
     migrate(&mut connection).await?;
+    audit_chain::begin(&mut connection).await?;
     let station = mark(&mut connection, &options).await?;
     let writer = Writer::new(connection, connect, station).await?;
 
     let readers = SqlitePoolOptions::new()
         .max_connections(4)
         .acquire_timeout(Duration::from_secs(10))
-        .connect_lazy_with(reader_options(&options));
+        .connect_lazy_with(reader_of(&options.folder));
 
     // After the database: a witness folder beside an empty file means that the file has lost its contents.
     let witness_path = options.folder.join("witness");
@@ -76,6 +78,7 @@ pub(super) async fn open(options: StoreOptions) -> Result<Store, StoreError> {
     })
     .await??;
 
+    let audit_head = Arc::new(HeadFile::new(&options.folder));
     Ok(Store(Arc::new(Inner {
         folder: options.folder,
         simulated: options.simulated,
@@ -83,6 +86,7 @@ pub(super) async fn open(options: StoreOptions) -> Result<Store, StoreError> {
         readers,
         witness,
         reserve: Mutex::new(reserve),
+        audit_head,
         _lock: lock,
     })))
 }
@@ -143,9 +147,10 @@ fn writer_options(options: &StoreOptions) -> SqliteConnectOptions {
     }
 }
 
-fn reader_options(options: &StoreOptions) -> SqliteConnectOptions {
+/// How the database in this folder is read.
+pub(super) fn reader_of(folder: &Path) -> SqliteConnectOptions {
     SqliteConnectOptions::new()
-        .filename(options.folder.join(DATABASE))
+        .filename(folder.join(DATABASE))
         .busy_timeout(Duration::from_secs(5))
         // Not `read_only`: a reader of a write-ahead log must be able to write its index.
         .pragma("query_only", "on")

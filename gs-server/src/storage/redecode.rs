@@ -9,9 +9,9 @@ use sqlx::Row as _;
 
 use super::row::{Row, select};
 use super::rows::{
-    AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow,
-    FrameRow, ImageRow, IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, PlanRow, ReceptionRow,
-    RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
+    AuditLinkRow, AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow,
+    EventRow, FrameRow, ImageRow, IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, PlanRow,
+    ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::write::Transaction;
 use super::{Store, StoreError};
@@ -233,6 +233,7 @@ async fn verify_the_rest(store: &Store, report: &mut RedecodeReport) -> Result<(
     verify::<ConditionRow>(store, report).await?;
     verify::<EventRow>(store, report).await?;
     verify::<AuditRow>(store, report).await?;
+    verify::<AuditLinkRow>(store, report).await?;
     verify::<IntentRow>(store, report).await
 }
 

@@ -504,6 +504,16 @@ row! {
 }
 
 row! {
+    /// What ties a row of the audit to the one before it.
+    AuditLinkRow in "audit_links" {
+        /// The row.
+        audit: i64,
+        /// SHA-256 over the hash of the row before and this row.
+        hash: Vec<u8>,
+    }
+}
+
+row! {
     /// An accepted intent.
     IntentRow in "intents" {
         /// Who.

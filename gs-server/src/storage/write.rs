@@ -10,12 +10,13 @@ use mission::{Batch, StationId};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row as _, SqliteConnection};
 
+use super::audit_chain::{self, AuditHead};
 use super::convert::{int, route};
 use super::row::{Row, select, upsert};
 use super::rows::{
-    AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow, EventRow,
-    FrameRow, ImageRow, IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, PlanRow, ReceptionRow,
-    RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
+    AuditLinkRow, AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow,
+    EventRow, FrameRow, ImageRow, IntentRow, LimitRow, ParameterRow, PassElementsRow, PassRow, PlanRow,
+    ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::{StoreError, StoredEvent};
 
@@ -39,6 +40,8 @@ pub(super) struct Writer {
 struct Memory {
     last_event: i64,
     last_audit: i64,
+    /// The hash of that row.
+    audit_hash: [u8; 32],
     /// Numbers of parameters by satellite and name.
     parameters: HashMap<String, HashMap<String, i64>>,
     last_parameter: i64,
@@ -56,6 +59,7 @@ impl Memory {
             last_audit: sqlx::query_scalar("select coalesce(max(id), 0) from audit")
                 .fetch_one(&mut *connection)
                 .await?,
+            audit_hash: audit_chain::newest(connection).await?,
             ..Self::default()
         };
         for row in sqlx::query(select::<RouteRow>("order by id")).fetch_all(&mut *connection).await? {
@@ -82,10 +86,17 @@ impl Writer {
         Ok(Self { connection: Some(connection), options, station, memory, unsettled: false, closed: false })
     }
 
-    pub(super) async fn apply(&mut self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
+    /// Stores a batch; also where the audit ends then, when the batch added to it.
+    pub(super) async fn apply(
+        &mut self,
+        batch: &Batch,
+    ) -> Result<(Vec<StoredEvent>, Option<AuditHead>), StoreError> {
+        let before = self.memory.last_audit;
         let mut connection = self.begin().await?;
         let result = self.within(&mut connection).batch(batch).await;
-        self.end(connection, result).await
+        let events = self.end(connection, result).await?;
+        let head = AuditHead { row: self.memory.last_audit, hash: self.memory.audit_hash };
+        Ok((events, (head.row != before).then_some(head)))
     }
 
     /// Begins a transaction on the connection that is handed out. A future that is dropped before [`Self::end`] drops
@@ -432,8 +443,11 @@ impl Transaction<'_> {
             action: record.action.into(),
             detail: record.detail.clone(),
         };
+        let hash = audit_chain::link(&self.memory.audit_hash, &row);
         self.insert(&row).await?;
+        self.insert(&AuditLinkRow { audit: row.id, hash: hash.to_vec() }).await?;
         self.memory.last_audit = row.id;
+        self.memory.audit_hash = hash;
         Ok(())
     }
 }

@@ -73,6 +73,9 @@ fn every_verb_tells_what_it_does() {
             "gs-server-key",
             "gs-server-key-new",
             "gs-server-key-list",
+            "gs-server-audit",
+            "gs-server-audit-list",
+            "gs-server-audit-verify",
             "gs-server-redecode",
         ]
     );

@@ -1,5 +1,6 @@
 //! Tests of the storage as a whole; each has a folder of its own.
 
+mod audit;
 mod conformance;
 mod damage;
 mod folder;
