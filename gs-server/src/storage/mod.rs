@@ -259,7 +259,12 @@ impl Store {
     /// [`StoreError`] when the database cannot be closed in order; nothing that was acknowledged is lost by that.
     pub async fn close(&self) -> Result<(), StoreError> {
         self.0.readers.close().await;
-        self.0.writer.lock().await.close().await
+        let mut writer = self.0.writer.lock().await;
+        if let Some(head) = writer.audit_head() {
+            let file = Arc::clone(&self.0.audit_head);
+            off_the_loop(move || file.raise(head)).await?;
+        }
+        writer.close().await
     }
 }
 

@@ -95,8 +95,14 @@ impl Writer {
         let mut connection = self.begin().await?;
         let result = self.within(&mut connection).batch(batch).await;
         let events = self.end(connection, result).await?;
+        let head = self.audit_head().filter(|head| head.row != before);
+        Ok((events, head))
+    }
+
+    /// Where the audit ends; `None` when it is empty.
+    pub(super) fn audit_head(&self) -> Option<AuditHead> {
         let head = AuditHead { row: self.memory.last_audit, hash: self.memory.audit_hash };
-        Ok((events, (head.row != before).then_some(head)))
+        (head.row > 0).then_some(head)
     }
 
     /// Begins a transaction on the connection that is handed out. A future that is dropped before [`Self::end`] drops
