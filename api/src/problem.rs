@@ -177,6 +177,8 @@ kinds! {
     QueueFull 429 "queue-full" "Too many commands wait";
     /// Nothing is locked.
     NotLocked 409 "not-locked" "Nothing is locked";
+    /// The clock leads above forgotten counters, and nobody vouches for it.
+    ClockNotVouched 409 "clock-not-vouched" "Nobody says that the clock is right";
     /// No plan has this name.
     UnknownPlan 404 "unknown-plan" "There is no such plan";
     /// The plan is wrong; the message says where and what to do.

@@ -19,6 +19,7 @@
 //! | [`plan`] | plans as text: read, checked, templates |
 //! | [`people`] | who may do what |
 //! | `pointing` | whom the antenna follows, by the schedule |
+//! | [`ops`] | backups, and what else keeps a server running for years |
 //! | [`cli`] | the command line, a file per verb |
 //!
 //! What it does **not** do: decide what to send or when (the mission engine does), know the wire format (`protocol`
@@ -37,6 +38,7 @@ pub mod hub;
 pub mod keys;
 pub mod lifecycle;
 pub mod links;
+pub mod ops;
 pub mod people;
 pub mod plan;
 mod pointing;

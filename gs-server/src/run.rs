@@ -9,6 +9,7 @@
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,6 +32,7 @@ use crate::hub::Hub;
 use crate::keys::{self, KeyError};
 use crate::lifecycle::{Lifecycle, TaskFailure};
 use crate::links::{self, LinkParts};
+use crate::ops::{sd, upkeep::UpkeepTask};
 use crate::pointing::{Place, Steering};
 use crate::storage::reserve::ReserveError;
 use crate::storage::{EventQuery, Page, Store, StoreError, StoreOptions};
@@ -67,6 +69,8 @@ pub struct RunOptions {
     pub set_log_filter: Option<SetLogFilter>,
     /// Facts of a demo for the page and the API.
     pub demo: Option<serde_json::Value>,
+    /// Where the configuration was read from; it goes into backups.
+    pub config_file: Option<PathBuf>,
 }
 
 impl RunOptions {
@@ -82,6 +86,7 @@ impl RunOptions {
             reload: None,
             set_log_filter: None,
             demo: None,
+            config_file: None,
         }
     }
 }
@@ -194,8 +199,20 @@ pub async fn run_with(
     listener: TcpListener,
     stop: CancellationToken,
 ) -> Result<Report, RunError> {
-    let RunOptions { config, timer, store, entropy, mut wires, ready, reload, set_log_filter, demo } =
-        options;
+    let RunOptions {
+        config,
+        timer,
+        store,
+        entropy,
+        mut wires,
+        ready,
+        reload,
+        set_log_filter,
+        demo,
+        config_file,
+    } = options;
+    // Whoever brings a clock looks after the machine as well, or need not.
+    let looks_after_itself = timer.is_none();
     config.check()?;
     no_core_dumps();
     tracing::info!("configuration:\n{config}");
@@ -266,6 +283,16 @@ pub async fn run_with(
         point(&radios, steering, antenna_tasks);
     }
     let elements = elements(&config, &handle, &store, &timer, &api)?;
+    if looks_after_itself {
+        let metrics = handle.metrics().clone();
+        let upkeep = UpkeepTask::new(&config, config_file, store.clone(), inbox.clone(), metrics);
+        let stop = api.soft.clone();
+        api.spawn("upkeep", async move {
+            upkeep.run(stop).await;
+            Ok(())
+        });
+        sd::tell_systemd(&api, &handle);
+    }
     let state = HttpState {
         elements,
         store: store.clone(),

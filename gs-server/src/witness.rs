@@ -8,8 +8,13 @@
 //! is written and synced, renamed over the old one, and the folder is synced. Whatever happens in between, the old line
 //! or the new one stands there.
 //!
+//! A folder that came out of a backup holds the file `restored` besides. A key without a witness of its own is then
+//! [`Witness::Restored`]: nothing is sealed until an operator has confirmed, which gives the key a witness again. What the
+//! backup knew of the counter stands in `<key id>.restored`.
+//!
 //! What it does **not** do: decide whether sealing may go on, or lower a counter.
 
+use std::collections::BTreeMap;
 use std::fs::{DirBuilder, File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
 use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
@@ -20,6 +25,9 @@ use protocol::{Counter, KeyId};
 
 /// First word of a witness: what it is, and the version of its form.
 const MARK: &str = "pixelsat-witness-1";
+
+/// Marks a folder that came out of a backup.
+const RESTORED: &str = "restored";
 
 /// More than any witness has; what is longer is none.
 const MOST_BYTES: u64 = 256;
@@ -57,21 +65,67 @@ impl WitnessFolder {
 
     /// What the witness of this key says. A temporary file that was left behind says nothing.
     pub fn read(&self, key: KeyId) -> Witness {
-        let path = self.file(key);
-        let damaged = |why: String| Witness::Damaged(format!("{}: {why}", path.display()));
-        let file = match File::open(&path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Witness::Missing,
-            Err(error) => return damaged(format!("it cannot be opened ({error})")),
+        match read(&self.file(key), key) {
+            Witness::Missing if self.path.join(RESTORED).exists() => {
+                match read(&self.path.join(key.to_string()).with_extension(RESTORED), key) {
+                    Witness::At(counter) | Witness::Restored(Some(counter)) => {
+                        Witness::Restored(Some(counter))
+                    }
+                    Witness::Missing | Witness::Damaged(_) | Witness::Restored(None) => {
+                        Witness::Restored(None)
+                    }
+                }
+            }
+            witness => witness,
+        }
+    }
+
+    /// Every key that has a witness here, with its counter; those that cannot be read are left out.
+    ///
+    /// # Errors
+    /// What the system says when the folder cannot be read.
+    pub fn all(&self) -> io::Result<Vec<(KeyId, Counter)>> {
+        let mut found = BTreeMap::new();
+        for entry in std::fs::read_dir(&self.path)? {
+            let name = entry?.file_name();
+            let Some(key) =
+                name.to_str().and_then(|name| name.split('.').next()).and_then(|name| name.parse().ok())
+            else {
+                continue;
+            };
+            if let Witness::At(counter) | Witness::Restored(Some(counter)) = self.read(key) {
+                found.insert(key.to_string(), (key, counter));
+            }
+        }
+        Ok(found.into_values().collect())
+    }
+
+    /// Marks this folder as one that came out of a backup, which knew these counters. Durable when it returns.
+    ///
+    /// # Errors
+    /// What the system says. The mark comes last: without it the folder must not be used.
+    pub fn mark_restored(&self, known: &[(KeyId, Counter)], remark: &str) -> io::Result<()> {
+        let write = |name: String, text: String| {
+            let path = self.path.join(name);
+            let file = Disk.write(&path, text.as_bytes())?;
+            Disk.sync(&path, &file)
         };
-        let mut bytes = Vec::new();
-        if let Err(error) = file.take(MOST_BYTES + 1).read_to_end(&mut bytes) {
-            return damaged(format!("it cannot be read ({error})"));
+        for (key, counter) in known {
+            write(format!("{key}.{RESTORED}"), line(*key, *counter))?;
         }
-        match parse(&bytes, key) {
-            Ok(counter) => Witness::At(counter),
-            Err(why) => damaged(why),
-        }
+        write(RESTORED.to_owned(), format!("{remark}\n"))?;
+        Disk.sync_folder(&self.path)
+    }
+
+    /// What stands in the file of a witness, for a backup.
+    pub(crate) fn text(key: KeyId, counter: Counter) -> String {
+        line(key, counter)
+    }
+
+    /// The reverse of [`Self::text`], with the name of the file; `None` when it is none.
+    pub(crate) fn parse_text(name: &str, content: &[u8]) -> Option<(KeyId, Counter)> {
+        let key = name.parse().ok()?;
+        parse(content, key).ok().map(|counter| (key, counter))
     }
 
     /// Raises the witness of this key to this counter; it is on the disk when this returns. Where the witness stands
@@ -95,6 +149,23 @@ impl WitnessFolder {
         steps.sync(&temporary, &file)?;
         steps.rename(&temporary, &path)?;
         steps.sync_folder(&self.path)
+    }
+}
+
+fn read(path: &Path, key: KeyId) -> Witness {
+    let damaged = |why: String| Witness::Damaged(format!("{}: {why}", path.display()));
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Witness::Missing,
+        Err(error) => return damaged(format!("it cannot be opened ({error})")),
+    };
+    let mut bytes = Vec::new();
+    if let Err(error) = file.take(MOST_BYTES + 1).read_to_end(&mut bytes) {
+        return damaged(format!("it cannot be read ({error})"));
+    }
+    match parse(&bytes, key) {
+        Ok(counter) => Witness::At(counter),
+        Err(why) => damaged(why),
     }
 }
 
@@ -249,6 +320,21 @@ mod tests {
         folder.raise(key(1), Counter(3)).unwrap();
         assert_eq!(folder.read(key(1)), Witness::At(Counter(u64::MAX)));
         assert_eq!(folder.read(key(2)), Witness::Missing);
+    }
+
+    #[test]
+    fn a_folder_from_a_backup_says_so_until_a_key_has_a_witness_of_its_own() {
+        let (_parent, folder) = folder();
+        folder.raise(key(1), Counter(5)).unwrap();
+        assert_eq!(folder.all().unwrap(), [(key(1), Counter(5))]);
+        let (_parent, restored) = self::folder();
+        restored.mark_restored(&folder.all().unwrap(), "out of a backup").unwrap();
+        assert_eq!(restored.read(key(1)), Witness::Restored(Some(Counter(5))));
+        assert_eq!(restored.read(key(2)), Witness::Restored(None), "a key that the backup did not know");
+        assert_eq!(restored.all().unwrap(), [(key(1), Counter(5))], "a backup of the backup knows it, too");
+        restored.raise(key(1), Counter(9)).unwrap();
+        assert_eq!(restored.read(key(1)), Witness::At(Counter(9)));
+        assert_eq!(restored.read(key(2)), Witness::Restored(None));
     }
 
     #[test]

@@ -198,6 +198,12 @@ pub enum Refusal {
     /// Nothing is locked for this key.
     #[error("sealing with key {0} is not locked")]
     NotLocked(KeyId),
+    /// What was restored goes on above the clock, and nobody says that it is right.
+    #[error(
+        "key {0} goes on above the clock, because counters were forgotten, and nobody says that the clock is right: \
+         synchronise it, or look at it and vouch for it, then confirm again"
+    )]
+    ClockNotVouched(KeyId),
     /// No such plan.
     #[error("plan: there is no plan '{0}'")]
     UnknownPlan(String),

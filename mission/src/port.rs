@@ -7,7 +7,8 @@ use protocol::{Counter, KeyId};
 use crate::clock::{Now, UtcUs};
 use crate::id::{BatchId, CommandId, IntentId, LinkId, SatelliteId, TxId};
 use crate::intent::{Accepted, IntentEnvelope, Refusal};
-use crate::record::{Batch, Route, Source};
+use crate::level::Level;
+use crate::record::{Batch, EventKind, Route, Source};
 
 /// What the world tells the engine.
 #[expect(clippy::large_enum_variant, reason = "an input lives for one call")]
@@ -97,6 +98,15 @@ pub enum Input<'a> {
     Antenna {
         /// What is wrong with it, as a sentence; `None`: nothing.
         fault: Option<&'a str>,
+    },
+    /// Something about the machine that is worth writing down: its disk, its backups.
+    Notice {
+        /// What it is about.
+        kind: EventKind,
+        /// How much anybody should care.
+        level: Level,
+        /// What it is, as a sentence.
+        message: &'a str,
     },
     /// Somebody wants something.
     Intent(IntentEnvelope),

@@ -132,4 +132,7 @@ pub enum Witness {
     Damaged(String),
     /// It stands here.
     At(Counter),
+    /// The folder was put back from a backup: counters that nobody remembers may have been radiated since. With the
+    /// highest one that the backup knew outside its database.
+    Restored(Option<Counter>),
 }

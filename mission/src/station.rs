@@ -160,6 +160,9 @@ impl Station {
                 }
             }
             Input::Antenna { fault } => self.antenna_fault = Some(fault.map(str::to_owned)),
+            Input::Notice { kind, level, message } => {
+                self.event(now.utc, kind, level, About::default(), message.to_owned());
+            }
             Input::Intent(envelope) => self.intent(now, envelope),
             Input::Wake => {}
             Input::Stop => self.stopping = true,

@@ -4,9 +4,11 @@
 //! to a person besides goes to standard error. Exit codes are those of [`Exit`], explained in `docs/cli.md`.
 
 mod audit;
+mod backup;
 mod config;
 mod decode;
 mod demo;
+mod doctor;
 mod elements;
 mod failure;
 mod key;
@@ -108,6 +110,12 @@ pub enum Command {
     /// Who did what, and whether the record of it is whole
     #[command(subcommand)]
     Audit(audit::Audit),
+    /// Look whether this machine is fit for its configuration, and say what to do
+    Doctor(doctor::Doctor),
+    /// Copy the archive while the server runs, or check such a copy
+    Backup(backup::Backup),
+    /// Make a data folder out of a backup
+    Restore(backup::Restore),
     /// Derive every value again from the raw frames
     Redecode(redecode::Redecode),
 }
@@ -150,6 +158,9 @@ impl Cli {
             Command::Schedule(schedule) => schedule.run(),
             Command::Runs(runs) => runs.run(),
             Command::Audit(audit) => audit.run(),
+            Command::Doctor(doctor) => doctor.run(),
+            Command::Backup(backup) => backup.run(),
+            Command::Restore(restore) => restore.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

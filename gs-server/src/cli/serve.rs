@@ -77,6 +77,7 @@ impl Serve {
         let (ready, is_ready) = oneshot::channel();
         let options = RunOptions {
             ready: Some(ready),
+            config_file: Some(self.config.clone()),
             reload: Some(reloads),
             set_log_filter: Some(Box::new(move |filter| set_log_filter(filter))),
             ..RunOptions::new(config)

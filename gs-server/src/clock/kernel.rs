@@ -27,6 +27,17 @@ pub(crate) async fn kernel_says_synchronised() -> bool {
     answer("chronyc", &["-c", "tracking"]).await.is_some_and(|answer| chrony_is_synchronised(&answer))
 }
 
+/// How far the machine's clock is from the time of its sources, seconds, when chrony keeps it.
+pub(crate) async fn clock_offset_s() -> Option<f64> {
+    let line = answer("chronyc", &["-c", "tracking"]).await?;
+    chrony_offset_s(&line)
+}
+
+/// The fifth field of `chronyc -c tracking`.
+fn chrony_offset_s(line: &str) -> Option<f64> {
+    chrony_is_synchronised(line).then(|| line.trim().split(',').nth(4)?.parse().ok()).flatten()
+}
+
 async fn answer(program: &str, arguments: &[&str]) -> Option<String> {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stderr(Stdio::null()).kill_on_drop(true);
@@ -50,6 +61,8 @@ mod tests {
     fn chrony_answers_are_understood() {
         let good = "C0A80001,gate,3,1700000000.0,0.000001,0.0,0.0,1.0,0.0,0.0,0.001,0.0002,64.2,Normal";
         assert!(chrony_is_synchronised(good));
+        assert_eq!(chrony_offset_s(good), Some(0.000_001));
+        assert_eq!(chrony_offset_s("506 Cannot talk to daemon"), None);
         assert!(!chrony_is_synchronised(&good.replace(",3,", ",0,")));
         assert!(!chrony_is_synchronised(&good.replace("Normal", "Not synchronised")));
         assert!(!chrony_is_synchronised("506 Cannot talk to daemon"));

@@ -46,7 +46,7 @@ mod system;
 mod wall;
 
 pub use gauge::{ByteGauge, Wire};
-pub(crate) use kernel::kernel_says_synchronised;
+pub(crate) use kernel::{clock_offset_s, kernel_says_synchronised};
 pub use stepped::{SteppedClock, SteppedOptions};
 pub use system::{ScaledClock, SystemClock};
 pub(crate) use wall::{wall_sleep, within};

@@ -79,6 +79,7 @@ impl Config {
         self.check_rssi()?;
         self.check_storage()?;
         self.check_elements()?;
+        self.check_ops()?;
         self.rotator.as_ref().map_or(Ok(()), super::RotatorSection::check)?;
         self.rig.as_ref().map_or(Ok(()), super::RigSection::check)?;
         self.check_simulated()

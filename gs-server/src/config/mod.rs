@@ -29,6 +29,7 @@ mod elements;
 mod environment;
 mod error;
 mod links;
+mod ops;
 mod reload;
 mod satellites;
 mod server;
@@ -45,6 +46,7 @@ pub use elements::{ElementsSection, FetchSource, MIN_AGE_LEAST_H};
 pub use environment::Environment;
 pub use error::ConfigError;
 pub use links::{AuxInput, LinkKind, LinkSection, ModePinWiring, Phy, UsbId};
+pub use ops::{BackupSection, DiskSection, RetentionSection};
 pub use reload::Changes;
 pub use satellites::{CounterSetting, LimitSection, SatelliteSection, Thresholds};
 pub use server::{
@@ -81,6 +83,15 @@ pub struct Config {
     /// What is logged.
     #[serde(default)]
     pub log: LogSection,
+    /// Backups that the server takes by itself; none by default.
+    #[serde(default)]
+    pub backup: Option<BackupSection>,
+    /// When the disk worries somebody.
+    #[serde(default)]
+    pub disk: DiskSection,
+    /// What may go; nothing by default.
+    #[serde(default)]
+    pub retention: RetentionSection,
     /// How simulated time runs; only with simulated links.
     #[serde(default)]
     pub simulation: Option<SimulationSection>,
@@ -128,7 +139,8 @@ impl Config {
         let files = self.links.iter_mut().filter_map(|link| link.file.as_mut());
         let others = [&mut self.storage.folder].into_iter().chain(self.http.token_file.as_mut());
         let logins = self.elements.fetch.iter_mut().filter_map(|source| source.credentials_file.as_mut());
-        for path in keys.chain(files).chain(others).chain(logins) {
+        let backup = self.backup.as_mut().map(|backup| &mut backup.folder);
+        for path in keys.chain(files).chain(others).chain(logins).chain(backup) {
             if path.is_relative() {
                 *path = base.join(&*path);
             }

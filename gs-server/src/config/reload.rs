@@ -30,6 +30,9 @@ impl Changes {
         note(old.rig != new.rig, "rig");
         note(old.http != new.http, "http");
         note(old.elements != new.elements, "elements");
+        note(old.backup != new.backup, "backup");
+        note(old.disk != new.disk, "disk");
+        note(old.retention != new.retention, "retention");
         note(old.simulation != new.simulation, "simulation");
         note(old.log.json != new.log.json, "log.json");
         note(old.links.len() != new.links.len(), "links");

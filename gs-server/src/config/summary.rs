@@ -105,6 +105,17 @@ impl fmt::Display for Config {
         if let Some(rig) = &self.rig {
             write!(f, "\nrig at {}: downlink {} Hz", rig.address, rig.downlink_hz)?;
         }
+        if let Some(backup) = &self.backup {
+            let folder = backup.folder.display();
+            write!(
+                f,
+                "\nbackup to {folder} every {} h, the newest {} are kept",
+                backup.every_h, backup.keep
+            )?;
+        }
+        if let Some(days) = self.retention.telemetry_days {
+            write!(f, "\nretention: values older than {days} days are removed, raw frames never")?;
+        }
         if let Some(simulation) = &self.simulation {
             write!(f, "\nsimulation: {} times life", simulation.speed)?;
         }

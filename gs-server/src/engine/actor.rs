@@ -8,7 +8,7 @@ use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
 use super::background::{Background, Outcome, ReserveWork};
-use super::handle::{EngineHandle, INTENTS, Request};
+use super::handle::{EngineHandle, INTENTS, PROBES, Probe, Request};
 use super::intents::Intents;
 use super::log;
 use super::message::{EngineInbox, EngineMessage, INBOX, LinkCommand, LinkPort};
@@ -16,6 +16,7 @@ use super::watch::StatusView;
 use crate::clock::{BusyToken, Timer, kernel_says_synchronised};
 use crate::config::ClockSetting;
 use crate::hub::Hub;
+use crate::ops::metrics::Metrics;
 use crate::storage::Store;
 
 /// How often the kernel is asked about its clock.
@@ -61,6 +62,8 @@ pub(crate) struct Engine {
     links: Vec<LinkPort>,
     inbox: mpsc::Receiver<(EngineMessage, BusyToken)>,
     requests: mpsc::Receiver<Request>,
+    probes: mpsc::Receiver<Probe>,
+    metrics: Metrics,
     intents: Intents,
     status: StatusView,
     background: Background,
@@ -80,6 +83,9 @@ impl Engine {
         let (status, shown) = StatusView::new(&station, now);
         let (sender, inbox) = mpsc::channel(INBOX);
         let (requests_in, requests) = mpsc::channel(INTENTS);
+        let (probes_in, probes) = mpsc::channel(PROBES);
+        let metrics = Metrics::default();
+        metrics.clock(vouched);
         let engine = Self {
             station,
             store,
@@ -88,13 +94,16 @@ impl Engine {
             links,
             inbox,
             requests,
+            probes,
+            metrics: metrics.clone(),
             intents: Intents::default(),
             status,
             background: Background::default(),
             timer: Arc::clone(&timer),
         };
         let inbox = EngineInbox { sender, timer: Arc::clone(&timer) };
-        (engine, inbox, EngineHandle { requests: requests_in, status: shown, timer })
+        let handle = EngineHandle { requests: requests_in, probes: probes_in, metrics, status: shown, timer };
+        (engine, inbox, handle)
     }
 
     /// Works until `finish` and everything is durable. After `stop` nothing new is radiated and no intent is taken.
@@ -139,6 +148,10 @@ impl Engine {
                     self.take_request(request);
                     busy
                 }
+                Some(Probe { answer, busy }) = self.probes.recv() => {
+                    let _ = answer.send(busy.clone());
+                    busy
+                }
                 busy = async { match sleep { Some(sleep) => sleep.await, None => std::future::pending().await } } => {
                     self.take_time();
                     busy
@@ -170,6 +183,7 @@ impl Engine {
     fn take_message(&mut self, message: EngineMessage) {
         match message {
             EngineMessage::Bytes { link, bytes, source, received } => {
+                self.metrics.engine_input(self.timer.now().mono.since(received.mono));
                 self.handle(Input::Bytes { link: &link, bytes: &bytes, source, received });
             }
             EngineMessage::Link { link, state } => self.handle(Input::Link { link: &link, state }),
@@ -182,6 +196,9 @@ impl Engine {
             }
             EngineMessage::View { satellite, in_view } => {
                 self.handle(Input::View { satellite: &satellite, in_view });
+            }
+            EngineMessage::Notice { kind, level, message } => {
+                self.handle(Input::Notice { kind, level, message: &message });
             }
             EngineMessage::Antenna { fault } => self.handle(Input::Antenna { fault: fault.as_deref() }),
         }
@@ -207,6 +224,7 @@ impl Engine {
             }
             Outcome::Persisted { batch, result: Err(error) } => {
                 let reason = whole(&error);
+                self.metrics.not_stored();
                 tracing::error!(batch = batch.0, "storage takes nothing: {reason}");
                 self.handle(Input::PersistFailed { batch, reason: &reason });
             }
@@ -229,7 +247,10 @@ impl Engine {
                 self.handle(Input::ReserveFailed { reason: &reason })
             }
             Outcome::Reserve { refused: None } => {}
-            Outcome::Clock { synchronised } => self.handle(Input::Clock { synchronised }),
+            Outcome::Clock { synchronised } => {
+                self.metrics.clock(synchronised);
+                self.handle(Input::Clock { synchronised });
+            }
         }
     }
 
@@ -250,9 +271,15 @@ impl Engine {
         while let Some(effect) = self.station.next_effect() {
             match effect {
                 Effect::Persist(batch) => {
-                    let store = self.store.clone();
+                    let (store, metrics) = (self.store.clone(), self.metrics.clone());
+                    let timer = Arc::clone(&self.timer);
                     self.background.start(self.timer.busy("storing a batch"), async move {
-                        Outcome::Persisted { batch: batch.id, result: store.apply(&batch).await }
+                        let began = timer.now().mono;
+                        let result = store.apply(&batch).await;
+                        if result.is_ok() {
+                            metrics.stored(&batch, timer.now().mono.since(began));
+                        }
+                        Outcome::Persisted { batch: batch.id, result }
                     });
                 }
                 Effect::Witness { key, counter } => {

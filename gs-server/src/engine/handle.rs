@@ -6,6 +6,7 @@ use mission::{Accepted, Intent, Principal, Refusal, Status};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::clock::{BusyToken, Timer};
+use crate::ops::metrics::Metrics;
 
 /// Intents that may be under way at once; more are refused as [`IntentError::Overloaded`].
 pub(crate) const INTENTS: usize = 64;
@@ -51,10 +52,22 @@ pub(crate) struct Request {
     pub(crate) busy: BusyToken,
 }
 
+/// Questions whether the engine lives that may wait; whoever finds no place knows that it does not answer.
+pub(crate) const PROBES: usize = 8;
+
+/// A question whether the engine lives.
+#[derive(Debug)]
+pub(crate) struct Probe {
+    pub(crate) answer: oneshot::Sender<BusyToken>,
+    pub(crate) busy: BusyToken,
+}
+
 /// Cheap to clone.
 #[derive(Clone)]
 pub struct EngineHandle {
     pub(crate) requests: mpsc::Sender<Request>,
+    pub(crate) probes: mpsc::Sender<Probe>,
+    pub(crate) metrics: Metrics,
     pub(crate) status: watch::Receiver<Arc<Status>>,
     pub(crate) timer: Arc<dyn Timer>,
 }
@@ -85,6 +98,18 @@ impl EngineHandle {
             Ok((result, _busy)) => result,
             Err(_) => Err(IntentError::Stopping),
         }
+    }
+
+    /// Whether the engine takes something in and answers. Waits as long as it takes.
+    pub async fn answers(&self) -> bool {
+        let (answer, answered) = oneshot::channel();
+        let probe = Probe { answer, busy: self.timer.busy("probe") };
+        self.probes.try_send(probe).is_ok() && answered.await.is_ok()
+    }
+
+    /// What is counted while it works.
+    pub fn metrics(&self) -> &Metrics {
+        &self.metrics
     }
 
     /// How the station is: the newest status of which everything is durable.

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use mission::{LinkId, LinkState, MaybeRadiated, Now, SatelliteId, Source, Transmit, TxId, UtcUs};
+use mission::record::EventKind;
+use mission::{Level, LinkId, LinkState, MaybeRadiated, Now, SatelliteId, Source, Transmit, TxId, UtcUs};
 use tokio::sync::mpsc;
 
 use crate::clock::{BusyToken, Timer};
@@ -64,6 +65,15 @@ pub enum EngineMessage {
     Antenna {
         /// What is wrong with it, as a sentence; `None`: nothing.
         fault: Option<String>,
+    },
+    /// Something about the machine that is worth an event.
+    Notice {
+        /// What it is about.
+        kind: EventKind,
+        /// How much anybody should care.
+        level: Level,
+        /// What it is, as a sentence.
+        message: String,
     },
 }
 

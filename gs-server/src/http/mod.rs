@@ -22,6 +22,7 @@ mod hosts;
 mod images;
 mod keys;
 mod links;
+mod metrics;
 mod page;
 mod plans;
 mod problem;

@@ -102,6 +102,7 @@ impl From<Refusal> for Failure {
             Refusal::QueueFull(_) => (ProblemKind::QueueFull, None),
             Refusal::Storage(_) => (ProblemKind::StorageFailing, None),
             Refusal::NotLocked(_) => (ProblemKind::NotLocked, None),
+            Refusal::ClockNotVouched(_) => (ProblemKind::ClockNotVouched, None),
             Refusal::UnknownPlan(_) => (ProblemKind::UnknownPlan, Some("plan")),
             Refusal::Plan(_) => (ProblemKind::PlanRefused, Some("plan")),
             Refusal::PlansFull(_) => (ProblemKind::PlansFull, None),

@@ -1,4 +1,6 @@
-//! `GET /api/v1/health` and `/api/v1/version`: is it there, is it well, what can it do.
+//! `GET /healthz`, `/readyz`, `/api/v1/health` and `/api/v1/version`: is it there, is it well, what can it do.
+
+use std::time::Duration;
 
 use api::{API_VERSION, CAPABILITIES, Health, Version};
 use axum::Json;
@@ -10,16 +12,44 @@ use mission::LinkState;
 use super::App;
 use super::extract::time;
 use super::problem::OwnBody;
+use crate::clock::within;
+
+/// The engine answers within this, or it does not live.
+const ANSWERS_WITHIN: Duration = Duration::from_secs(2);
 
 /// 200 when frames are stored, 503 when not; a body with the reasons in both cases.
 pub(super) async fn health(State(app): State<App>) -> Response {
+    answer(view(&app, true).await)
+}
+
+/// 200 when the process lives and the engine answers, 503 when not. For whoever restarts what hangs.
+pub(super) async fn alive(State(app): State<App>) -> Response {
+    let mut health = view(&app, true).await;
+    health.live = engine_answers(&app).await;
+    health.ready = health.live;
+    answer(health)
+}
+
+/// 200 when requests should come here, 503 with the reasons when not. For whoever stands before several servers.
+pub(super) async fn ready(State(app): State<App>) -> Response {
+    let answers = engine_answers(&app).await;
+    answer(view(&app, answers).await)
+}
+
+async fn engine_answers(app: &App) -> bool {
+    within(ANSWERS_WITHIN, app.state.engine.answers()).await == Some(true)
+}
+
+async fn view(app: &App, engine_answers: bool) -> Health {
     let status = app.state.engine.status();
     let mut reasons = Vec::new();
+    if !engine_answers {
+        reasons.push("the engine does not answer".to_owned());
+    }
     if let Some(failing) = &status.storage.failing {
         reasons.push(format!("storage: {failing}"));
     }
-    let readable = app.state.store.last_event_seq().await;
-    if readable.is_err() {
+    if app.state.store.last_event_seq().await.is_err() {
         reasons.push("storage: the archive cannot be read".to_owned());
     }
     if app.state.stop.is_cancelled() {
@@ -32,8 +62,11 @@ pub(super) async fn health(State(app): State<App>) -> Response {
             reasons.push(format!("link {}: {reason}", link.link));
         }
     }
-    let health = Health { live: true, ready, reasons, at: time(app.state.timer.now().utc.0) };
-    if ready {
+    Health { live: engine_answers, ready, reasons, at: time(app.state.timer.now().utc.0) }
+}
+
+fn answer(health: Health) -> Response {
+    if health.ready {
         return Json(health).into_response();
     }
     let mut response = (StatusCode::SERVICE_UNAVAILABLE, Json(health)).into_response();

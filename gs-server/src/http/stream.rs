@@ -64,8 +64,12 @@ pub(super) async fn open(
         .write_buffer_size(0)
         .max_write_buffer_size(WRITE_BUFFER);
     Ok(upgrade.on_upgrade(move |socket| async move {
+        let metrics = app.state.engine.metrics().clone();
+        let open = metrics.stream();
         let mut follower = Follower { app, socket, last: 0, unanswered: 0 };
         let why = follower.follow(asked.after).await;
+        drop(open);
+        metrics.stream_ended(why.word());
         follower.close(why).await;
         drop(place);
     }))
@@ -84,6 +88,19 @@ enum End {
     Stopping,
     /// The archive cannot be read.
     Archive,
+}
+
+impl End {
+    /// The word of it in metrics.
+    const fn word(self) -> &'static str {
+        match self {
+            Self::Gone => "gone",
+            Self::TooSlow => "too-slow",
+            Self::Talks => "talks",
+            Self::Stopping => "stopping",
+            Self::Archive => "archive",
+        }
+    }
 }
 
 struct Follower {

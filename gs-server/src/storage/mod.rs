@@ -14,16 +14,19 @@
 //! What it does **not** do: keep keys, know HTTP, delete anything that was heard or sent.
 
 mod audit_chain;
+mod backup;
 mod convert;
 mod convert_plan;
 mod convert_sky;
 mod error;
+mod inspect;
 mod lock;
 mod open;
 mod progress;
 mod read;
 mod redecode;
 pub mod reserve;
+mod retention;
 mod row;
 mod rows;
 mod snapshot;
@@ -44,7 +47,9 @@ use sqlx::sqlite::SqlitePool;
 use crate::witness::WitnessFolder;
 
 pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
+pub use backup::{DatabaseFacts, copy_database, examine_database};
 pub use error::StoreError;
+pub use inspect::{Inspection, inspect_database};
 pub use read::{
     Bucket, ChunkState, CommandLife, CommandNow, CommandQuery, Counts, EventQuery, FrameQuery, Heard,
     HeardCounts, ImageBytes, ImageMap, LatestValue, Page, Sample, Samples, Scope, Series, TelemetryQuery,

@@ -76,6 +76,10 @@ fn every_verb_tells_what_it_does() {
             "gs-server-audit",
             "gs-server-audit-list",
             "gs-server-audit-verify",
+            "gs-server-doctor",
+            "gs-server-backup",
+            "gs-server-backup-verify",
+            "gs-server-restore",
             "gs-server-redecode",
         ]
     );

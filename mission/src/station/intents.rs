@@ -70,6 +70,11 @@ impl Station {
                 if !locked {
                     return Err(Refusal::NotLocked(key));
                 }
+                let needs_clock =
+                    self.satellites[s].sealer.as_ref().is_some_and(|x| x.needs_the_clock_to_unlock());
+                if needs_clock && !self.is_vouched() {
+                    return Err(Refusal::ClockNotVouched(key));
+                }
                 self.audit(now.utc, who, "key.confirm-counter", format!("key {key}"));
                 self.confirm_counter(now, s, who);
                 Ok(Accepted::Done)

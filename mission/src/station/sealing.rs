@@ -26,6 +26,10 @@ pub(super) enum Lock {
     WitnessMissing { database: u64 },
     #[error("the witness file cannot be read ({0}). Confirm the counter if the file was damaged")]
     WitnessDamaged(String),
+    #[error(
+        "this archive was restored from a backup and does not know the counters that were radiated since. See that the clock is right, then confirm the counter to go on above it"
+    )]
+    Restored,
     #[error("the witness could not be raised: {0}")]
     WitnessStuck(String),
     #[error("no counter was used yet and nobody vouches for the clock: synchronise it, or vouch for it")]
@@ -80,6 +84,10 @@ impl Sealer {
             (None, Witness::Missing) => {}
             (Some(database), Witness::Missing) => {
                 sealer.lock = Some(Lock::WitnessMissing { database: database.0 });
+            }
+            (_, Witness::Restored(witness)) => {
+                sealer.witness = witness;
+                sealer.lock = Some(Lock::Restored);
             }
             (_, Witness::Damaged(why)) => sealer.lock = Some(Lock::WitnessDamaged(why)),
             (database, Witness::At(witness)) => {
@@ -178,9 +186,14 @@ impl Sealer {
         self.last == Some(counter)
     }
 
-    /// The database is behind the witness: what happened in between is lost.
+    /// The database is behind what was radiated, or may be: what happened in between is lost.
     pub(super) fn database_went_back(&self) -> bool {
-        matches!(self.lock, Some(Lock::WitnessAhead { .. }))
+        matches!(self.lock, Some(Lock::WitnessAhead { .. } | Lock::Restored))
+    }
+
+    /// Only a clock that is right leads above counters that nobody remembers.
+    pub(super) fn needs_the_clock_to_unlock(&self) -> bool {
+        self.rule == CounterRule::Time && matches!(self.lock, Some(Lock::Restored))
     }
 }
 
@@ -213,6 +226,51 @@ mod tests {
         locked.spend(floor);
         locked.witness_done(floor);
         assert_eq!(locked.permit(UtcUs(0), false).map(|p| p.counter.0), Ok(21));
+    }
+
+    #[test]
+    fn what_was_restored_locks_whatever_it_knows_and_goes_on_above_the_clock() {
+        for (database, witness) in [(Some(10), None), (None, None), (Some(10), Some(Counter(20)))] {
+            let locked = sealer(CounterRule::Time, database, Witness::Restored(witness));
+            assert_eq!(locked.permit(NOW, true), Err(Lock::Restored));
+            assert!(locked.database_went_back() && locked.needs_the_clock_to_unlock());
+            assert_eq!(locked.floor(NOW, true), Counter(1_800_000_000_000_000));
+            let known = database.map(Counter).max(witness).unwrap_or(Counter(0));
+            assert_eq!(locked.floor(NOW, false), known, "the witness of the backup counts");
+        }
+        assert!(
+            !sealer(CounterRule::Sequence, Some(10), Witness::Restored(None)).needs_the_clock_to_unlock()
+        );
+    }
+
+    #[test]
+    fn a_hundred_thousand_seals_after_a_restore_repeat_no_counter_of_the_lost_time() {
+        let mut utc = NOW;
+        let seal = |sealer: &mut Sealer, utc: UtcUs| {
+            let counter = sealer.permit(utc, true).unwrap().counter;
+            sealer.spend(counter);
+            counter.0
+        };
+        let mut first = sealer(CounterRule::Time, Some(10), Witness::At(Counter(10)));
+        let at_backup = seal(&mut first, utc);
+        // The clock stands still, creeps, leaps and goes back a little: what a machine's clock does.
+        let steps = [0, 0, 1, 2, 700, -300, 1_000_000];
+        let mut spent = std::collections::BTreeSet::new();
+        for n in 0..100_000_usize {
+            utc = utc.plus(steps[n % steps.len()]);
+            assert!(spent.insert(seal(&mut first, utc)));
+        }
+        let mut second =
+            sealer(CounterRule::Time, Some(at_backup), Witness::Restored(Some(Counter(at_backup))));
+        assert!(second.permit(utc, true).is_err());
+        let floor = second.floor(utc.plus(1), true);
+        second.unlocking = Some((super::super::journal::Journal::default().ticket(), floor));
+        second.spend(floor);
+        second.witness_done(floor);
+        for n in 0..100_000_usize {
+            utc = utc.plus(steps[n % steps.len()]);
+            assert!(spent.insert(seal(&mut second, utc)), "a counter was spent twice");
+        }
     }
 
     #[test]

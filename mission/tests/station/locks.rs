@@ -50,6 +50,9 @@ fn a_witness_ahead_missing_or_damaged_locks_until_an_operator_confirms() {
         (Some(LAST), Witness::Missing),
         (Some(LAST), Witness::Damaged("torn".into())),
         (None, Witness::Damaged("torn".into())),
+        (Some(LAST), Witness::Restored(None)),
+        (None, Witness::Restored(Some(Counter(LAST)))),
+        (None, Witness::Restored(None)),
     ] {
         let mut world = with_key(counter, witness.clone());
         world.come_into_contact();
@@ -70,6 +73,21 @@ fn a_witness_ahead_missing_or_damaged_locks_until_an_operator_confirms() {
         assert_eq!(world.transmits.len(), 1);
         assert!(counter_of(world.last_tx()) > LAST + 500 || counter.is_none());
     }
+}
+
+#[test]
+fn what_was_restored_is_not_unlocked_while_nobody_vouches_for_the_clock() {
+    let mut world = unsynchronised(with_key(Some(LAST), Witness::Restored(None)));
+    world.come_into_contact();
+    world.command(Telecommand::Ping);
+    let id = world.want(Intent::ConfirmCounter(world.key()));
+    assert!(matches!(world.reply(id), Some(Err(Refusal::ClockNotVouched(_)))));
+    world.pass(10 * S);
+    assert!(world.transmits.is_empty() && world.locked().is_some());
+    world.want(Intent::VouchClock);
+    world.want(Intent::ConfirmCounter(world.key()));
+    world.pass(10 * S);
+    assert_eq!(world.transmits.len(), 1);
 }
 
 #[test]

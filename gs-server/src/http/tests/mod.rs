@@ -1,6 +1,7 @@
 //! A real store in a temporary folder and a real engine, heard by a satellite made of bytes.
 
 mod elements;
+mod operations;
 mod page;
 mod plans;
 mod reads;

@@ -1,0 +1,77 @@
+//! Copies of the database for backups: made beside a server that writes, and looked at afterwards.
+
+use std::path::Path;
+use std::time::Duration;
+
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{Connection as _, SqliteConnection};
+
+use super::open::schema_crc;
+use super::row::{Row as _, select};
+use super::rows::MetaRow;
+use super::{DATABASE, StoreError};
+
+/// What a database says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DatabaseFacts {
+    /// Whose it is.
+    pub station: String,
+    /// What it holds is made up.
+    pub simulated: bool,
+    /// The newest step of the schema.
+    pub schema: i64,
+    /// The place of the newest event; 0 when there is none.
+    pub last_event: i64,
+    /// The number of the newest raw frame; 0 when there is none.
+    pub last_frame: i64,
+}
+
+/// Writes the database of this data folder as it is at one moment to `to`, which must not exist or be empty. Waits for
+/// nobody, and whoever writes does not wait either. Not synced.
+///
+/// # Errors
+/// [`StoreError`] when the database cannot be read or the copy cannot be written.
+pub async fn copy_database(folder: &Path, to: &Path) -> Result<(), StoreError> {
+    // Not `read_only`: a reader of a write-ahead log must be able to write its index.
+    let options = SqliteConnectOptions::new()
+        .filename(folder.join(DATABASE))
+        .create_if_missing(false)
+        .busy_timeout(Duration::from_secs(10));
+    let mut connection = SqliteConnection::connect_with(&options).await?;
+    let target = to.to_str().ok_or_else(|| StoreError::Permission { path: to.to_path_buf() })?;
+    sqlx::query("vacuum into ?").bind(target).persistent(false).execute(&mut connection).await?;
+    Ok(connection.close().await?)
+}
+
+/// Looks at a database that nobody writes: are its pages whole, its tables ours, and what does it say of itself.
+///
+/// # Errors
+/// [`StoreError::Damaged`] when anything is not as this program makes it.
+pub async fn examine_database(file: &Path) -> Result<DatabaseFacts, StoreError> {
+    let options = SqliteConnectOptions::new().filename(file).read_only(true).immutable(true);
+    let mut connection = SqliteConnection::connect_with(&options).await?;
+    let facts = facts(&mut connection).await?;
+    let finding: String = sqlx::query_scalar("pragma quick_check(1)").fetch_one(&mut connection).await?;
+    if finding != "ok" {
+        return Err(StoreError::damaged(finding.trim().replace('\n', "; ")));
+    }
+    connection.close().await?;
+    Ok(facts)
+}
+
+pub(super) async fn facts(connection: &mut SqliteConnection) -> Result<DatabaseFacts, StoreError> {
+    let meta = sqlx::query(select::<MetaRow>("where id = 1")).fetch_one(&mut *connection).await?;
+    let meta = MetaRow::read(&meta)?;
+    if meta.schema_crc != schema_crc(connection).await? {
+        return Err(StoreError::damaged("its tables are not those that this program made"));
+    }
+    let schema = sqlx::query_scalar("select max(version) from _sqlx_migrations").fetch_one(&mut *connection);
+    let schema = schema.await?;
+    let last_event =
+        sqlx::query_scalar("select coalesce(max(seq), 0) from events").fetch_one(&mut *connection);
+    let last_event = last_event.await?;
+    let last_frame =
+        sqlx::query_scalar("select coalesce(max(id), 0) from frames").fetch_one(&mut *connection);
+    let last_frame = last_frame.await?;
+    Ok(DatabaseFacts { station: meta.station, simulated: meta.simulated, schema, last_event, last_frame })
+}
