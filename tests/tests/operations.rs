@@ -97,3 +97,24 @@ fn a_server_takes_its_backups_and_tells_how_it_is() {
     assert_eq!(folder.file("safe").read_dir().expect("a folder").count(), 1);
     server.stop();
 }
+
+#[test]
+fn systemd_hears_that_it_is_ready_that_it_lives_and_that_it_stops() {
+    let folder = Folder::new();
+    let path = folder.file("notify");
+    let socket = std::os::unix::net::UnixDatagram::bind(&path).expect("a socket");
+    socket.set_read_timeout(Some(PATIENCE)).expect("a time-out");
+    let next = || {
+        let mut buffer = [0; 256];
+        let count = socket.recv(&mut buffer).expect("the server says something");
+        String::from_utf8_lossy(&buffer[..count]).trim().to_owned()
+    };
+    let mut command = gs_server(["serve", "--config"]);
+    command.arg(folder.write_config()).env("NOTIFY_SOCKET", &path).env("WATCHDOG_USEC", "400000");
+    let server = Server::start_by(&folder, command);
+    assert_eq!(next(), "READY=1");
+    assert_eq!((next(), next()), ("WATCHDOG=1".to_owned(), "WATCHDOG=1".to_owned()));
+    server.stop();
+    let last = std::iter::repeat_with(next).find(|word| word != "WATCHDOG=1");
+    assert_eq!(last.as_deref(), Some("STOPPING=1"));
+}

@@ -8,6 +8,7 @@
 
 mod files;
 mod help;
+mod packaging;
 mod plan;
 mod plans;
 mod radio;

@@ -27,7 +27,7 @@ async fn metrics_are_prometheus_text_with_few_labels() {
         "gs_link_state{satellite=\"pixelsat-1\",link=\"e22\",state=\"ok\"} ",
         "gs_clock_synchronised 1\n",
         "gs_event_sequence 1\n",
-        "gs_persist_seconds_count 1\n",
+        "gs_persist_seconds_count ",
         "gs_storage_failing 0\n",
         "gs_streams 0\n",
         "process_resident_memory_bytes ",
