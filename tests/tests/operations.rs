@@ -1,6 +1,7 @@
 //! A server as whoever looks after the machine sees it: doctor, metrics, backups that it takes by itself.
 #![expect(clippy::expect_used, reason = "a test that cannot be set up has failed, loudly")]
 
+use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt as _;
 use std::time::Duration;
 
@@ -40,8 +41,8 @@ fn the_doctor_finds_what_is_wrong_and_says_what_to_do() {
     drop(twin);
 
     // One fault after the other; each is named, and its remedy.
-    std::fs::set_permissions(folder.data(), PermissionsExt::from_mode(0o755)).expect("a mode");
-    std::fs::set_permissions(folder.file("twin.key"), PermissionsExt::from_mode(0o644)).expect("a mode");
+    std::fs::set_permissions(folder.data(), Permissions::from_mode(0o755)).expect("a mode");
+    std::fs::set_permissions(folder.file("twin.key"), Permissions::from_mode(0o644)).expect("a mode");
     let _ = std::fs::remove_file(folder.port());
     let _taken = std::net::TcpListener::bind(folder.address).expect("the server's port");
     let (code, report) = doctor(&folder);
