@@ -9,6 +9,7 @@ mod decode;
 mod demo;
 mod elements;
 mod failure;
+mod hold;
 mod key;
 mod look;
 mod passes;
@@ -96,6 +97,10 @@ pub enum Command {
     Schedule(schedule::Schedule),
     /// What became of plans in passes, or the report of one
     Runs(runs::Runs),
+    /// Take a satellite over from the plan that runs
+    Hold(hold::Hold),
+    /// Give a satellite back to its plan
+    Release(hold::Release),
     /// The antenna's rotator by hand, through rotctld
     #[command(subcommand)]
     Rotator(rotator::Rotator),
@@ -150,6 +155,8 @@ impl Cli {
             Command::Schedule(schedule) => schedule.run(),
             Command::Runs(runs) => runs.run(),
             Command::Audit(audit) => audit.run(),
+            Command::Hold(hold) => hold.run(),
+            Command::Release(release) => release.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

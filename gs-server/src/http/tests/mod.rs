@@ -4,6 +4,7 @@ mod elements;
 mod page;
 mod plans;
 mod reads;
+mod rehearsals;
 mod security;
 mod sky;
 mod stream;
