@@ -148,8 +148,8 @@ fn a_plan_is_added_attached_armed_scheduled_and_withdrawn() {
         (&["plan", "arm", "No Name"], 2, "plan:"),
         (&["plan", "attach", "status"], 2, "--at"),
         (&["runs", "99999"], 3, "There is no run 99999"),
-        (&["hold", "pixelsat-1"], 3, "nothing runs"),
-        (&["release", "pixelsat-1"], 3, "nothing runs"),
+        (&["hold", "pixelsat-1"], 3, "no plan runs for pixelsat-1"),
+        (&["release", "pixelsat-1"], 3, "no plan runs for pixelsat-1"),
         (&["hold", "nobody"], 3, "nobody"),
         (&["hold", "../plans"], 2, "satellite:"),
     ] {

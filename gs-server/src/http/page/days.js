@@ -19,6 +19,7 @@ const LEGEND = [
   ["refused", "refused: in conflict"],
   ["free", "no plan wants it"],
   ["closed", "station closed"],
+  ["unlicensed", "may not transmit"],
 ];
 
 let drawn = "";
@@ -48,7 +49,7 @@ function paintLegend() {
   for (const [name, text] of LEGEND) {
     const item = make("span", "key");
     const svg = el("svg", { width: 14, height: 12, viewBox: "0 0 14 12" });
-    svg.append(hatches(), el("rect", { class: `bar ${name}`, x: 1, y: 1, width: 12, height: 10 }));
+    svg.append(hatches(), el("rect", { class: `slot ${name}`, x: 1, y: 1, width: 12, height: 10 }));
     item.append(svg, text);
     legend.append(item);
   }
@@ -122,17 +123,17 @@ function closed(svg, from, until, x, height) {
   for (const { start, stop, why } of schedule.closed) {
     const [a, b] = [Math.max(ms(start), from), Math.min(ms(stop), until)];
     if (a >= b) continue;
-    const rect = el("rect", { class: "bar closed", fill: filling("closed"), x: x(a), y: HEAD - 4, width: Math.max(LEAST, x(b) - x(a)), height: height - HEAD + 4 });
+    const rect = el("rect", { class: "slot closed", fill: filling("closed"), x: x(a), y: HEAD - 4, width: Math.max(LEAST, x(b) - x(a)), height: height - HEAD + 4 });
     rect.append(el("title", {}, `closed ${clock(ms(start))}Z to ${clock(ms(stop))}Z: ${why}`));
     svg.append(rect);
     const room = x(b) - x(a) - 8;
-    if (room > 30) svg.append(el("text", { class: "closed-why", x: x(a) + 4, y: height - 4 }, fit(why, room)));
+    if (room > 30) svg.append(el("text", { class: "closed-why", x: x(a) + 4, y: HEAD + 6 }, fit(why, room)));
   }
   if (!schedule.licence) return;
   let at = from;
   const shut = (a, b) => {
     if (a >= b) return;
-    const rect = el("rect", { class: "unlicensed", x: x(a), y: HEAD - 4, width: x(b) - x(a), height: 3 });
+    const rect = el("rect", { class: "slot unlicensed", x: x(a), y: HEAD - 4, width: x(b) - x(a), height: 3 });
     rect.append(el("title", {}, "outside of the licence: nothing is transmitted"));
     svg.append(rect);
   };
@@ -167,10 +168,10 @@ function row(svg, name, base, x, from, until, all) {
     const room = (next ? x(ms(next.aos)) : x(until)) - x(aos) - 4;
     g.append(el("rect", { class: "touch", x: x(aos) - 4, y: base - BAR_MAX - 2, width: Math.max(16, Math.min(room, 60)), height: ROW - 4 }));
     if (of && (of.start > aos + 1000 || of.stop < los - 1000) && state !== "refused") {
-      g.append(el("rect", { class: "bar whole", x: x(aos), y: base - high, width: wide, height: high }));
-      g.append(el("rect", { class: `bar ${state}`, x: x(of.start), y: base - high, width: Math.max(LEAST, x(of.stop) - x(of.start)), height: high }));
+      g.append(el("rect", { class: "slot whole", x: x(aos), y: base - high, width: wide, height: high }));
+      g.append(el("rect", { class: `slot ${state}`, x: x(of.start), y: base - high, width: Math.max(LEAST, x(of.stop) - x(of.start)), height: high }));
     } else {
-      const bar = el("rect", { class: `bar ${state}`, x: x(aos), y: base - high, width: wide, height: high });
+      const bar = el("rect", { class: `slot ${state}`, x: x(aos), y: base - high, width: wide, height: high });
       if (filling(state)) bar.setAttribute("fill", filling(state));
       g.append(bar);
     }
