@@ -32,6 +32,7 @@ mod image;
 mod page;
 mod plan;
 mod problem;
+mod rehearsal;
 mod run;
 mod sky;
 mod station;
@@ -57,9 +58,13 @@ pub use plan::{
     PlanText, StepText,
 };
 pub use problem::{FieldError, Problem, ProblemKind};
+pub use rehearsal::{
+    Percentiles, RehearsalAnswer, RehearsalRequest, RehearsalView, RehearsedEnd, RehearsedFigures,
+    RehearsedPass, RehearsedRun, RehearsedStep,
+};
 pub use run::{
-    AttachRequest, ContactView, PlanView, RefusedView, RivalView, RunReport, RunView, ScheduleView,
-    StepReport,
+    AttachRequest, ClosedView, ContactView, OpenView, PlanView, RefusedView, RivalView, RunReport, RunView,
+    ScheduleView, StepReport,
 };
 pub use sky::{
     ElementsUsed, ElementsView, FineTime, LookList, LookView, PassEndWord, PassKept, PassList, PassView,

@@ -54,6 +54,30 @@ pub struct ScheduleView {
     pub gap: f64,
     /// It is proved that no schedule is worth more.
     pub proved: bool,
+    /// When the station is closed, in order of time.
+    pub closed: Vec<ClosedView>,
+    /// The only times at which the station may transmit, in order of time; `null`: always.
+    pub licence: Option<Vec<OpenView>>,
+}
+
+/// A time in which nothing is planned.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ClosedView {
+    /// Its begin.
+    pub start: Time,
+    /// Its end.
+    pub stop: Time,
+    /// Why, as the configuration says it.
+    pub why: String,
+}
+
+/// A time in which the station may transmit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OpenView {
+    /// Its begin.
+    pub start: Time,
+    /// Its end.
+    pub stop: Time,
 }
 
 /// A pass that was chosen.

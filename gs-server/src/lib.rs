@@ -18,6 +18,8 @@
 //! | [`twin`], [`demo`] | the simulated satellite behind a real port; a pass with everything real but the satellite |
 //! | [`plan`] | plans as text: read, checked, templates |
 //! | [`people`] | who may do what |
+//! | `schedule` | a schedule in the words of the API |
+//! | `rehearsed` | what a rehearsal came to, in the words of the API |
 //! | `pointing` | whom the antenna follows, by the schedule |
 //! | [`ops`] | backups, and what else keeps a server running for years |
 //! | [`cli`] | the command line, a file per verb |
@@ -42,7 +44,9 @@ pub mod ops;
 pub mod people;
 pub mod plan;
 mod pointing;
+mod rehearsed;
 pub mod run;
+mod schedule;
 pub mod sky;
 pub mod storage;
 pub mod twin;

@@ -7,6 +7,7 @@
 //! | `contact` | when the satellite was heard, and when it transmits by itself |
 //! | `plans` | plans that were handed over |
 //! | `agenda` | which plan gets which pass |
+//! | `health` | with what nothing is planned, because it does not work |
 //! | `runner` | a plan in its pass |
 //! | `conditions` | what else must hold before a command leaves |
 //! | `sky` | elements and passes: whether the satellite is in view |
@@ -29,6 +30,7 @@ mod conditions;
 mod contact;
 mod download;
 mod gate;
+mod health;
 mod image;
 mod intake;
 mod intents;

@@ -21,6 +21,12 @@ pub struct Folder {
     pub heartbeat_s: u32,
     /// The satellite knows GetImageRanges, and the station knows that it does.
     pub ranges: bool,
+    /// More keys of the station's section.
+    pub station: String,
+    /// More keys of the satellite's section.
+    pub satellite: String,
+    /// More sections.
+    pub sections: String,
     /// More keys of the link's section.
     pub link: String,
     /// More keys of the storage section.
@@ -53,6 +59,9 @@ impl Folder {
             speed: None,
             heartbeat_s: 60,
             ranges: false,
+            station: String::new(),
+            satellite: String::new(),
+            sections: String::new(),
             link: "mode_pins = \"software\"\n".to_owned(),
             storage: String::new(),
             log: "info".to_owned(),
@@ -120,20 +129,21 @@ impl Folder {
     /// The configuration as text.
     #[must_use]
     pub fn config_text(&self) -> String {
-        let Self { address, heartbeat_s, ranges, link, storage, log, .. } = self;
+        let Self { address, heartbeat_s, ranges, station, satellite, sections, link, storage, log, .. } =
+            self;
         let port = self.port();
         let mut text = format!(
             r#"
 [station]
 name = "bench"
 clock = "trust"
-
+{station}
 [[satellites]]
 name = "sat"
 key_file = "twin.key"
 heartbeat_period_s = {heartbeat_s}
 ranges = {ranges}
-
+{satellite}
 [[links]]
 name = "pty"
 satellite = "sat"
@@ -151,7 +161,8 @@ listen = "{address}"
 
 [log]
 filter = "{log}"
-"#,
+
+{sections}"#,
             port = port.display()
         );
         if let Some(speed) = self.speed {

@@ -5,6 +5,7 @@
 //! | [`binary`] | where `gs-server` is, built when it is missing or old |
 //! | [`folder`] | a folder of its own for each test, with a configuration and a key |
 //! | [`process`] | a server, a twin, a foreign satellite: started, watched, killed |
+//! | [`overhead`] | elements that bring the satellite over the station when a test wants it |
 //! | [`http`] | a client of API v1 that believes only whole answers |
 //! | [`pty`] | a pseudo-terminal, for tests that play the radio themselves |
 //! | [`stream`] | a follower of the WebSocket |
@@ -22,6 +23,7 @@ pub mod folder;
 pub mod http;
 pub mod journal;
 pub mod operator;
+pub mod overhead;
 pub mod process;
 pub mod pty;
 pub mod strace;

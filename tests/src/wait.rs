@@ -12,6 +12,14 @@ pub fn now() -> Instant {
     Instant::now()
 }
 
+/// Microseconds since 1970 by the machine's clock.
+#[must_use]
+#[expect(clippy::disallowed_methods, reason = "the sky of a test is arranged around the machine's time")]
+pub fn utc_us() -> i64 {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_micros()).unwrap_or(i64::MAX)
+}
+
 /// Stands still for this long.
 #[expect(clippy::disallowed_methods, reason = "real processes are watched from outside, in real time")]
 pub fn pause(duration: Duration) {

@@ -13,6 +13,12 @@
 //! | body of the wrong shape or size | whole requests over a socket | every field: `http/tests` |
 //! | witness or database rolled back | files put back | each case of the table: `mission`, `sealing.rs` |
 //! | simulated key, real link | exit code and sentence | `gs-server/tests/run/start_and_end.rs` (folder and clock too) |
+//! | plan with an unknown step, a critical step without approval, a limit exceeded | | `gs-server/tests/cli/plan.rs`, `http/tests/plans.rs`, each field: `plan/tests.rs` |
+//! | plan longer than its pass | | `gs-server/src/plan/tests.rs`, `gs-server/tests/cli/rehearse.rs` |
+//! | plan attached to a pass that moved or is gone | | `mission/tests/station/plans.rs` (`chosen_pass_that_new_elements_take_away_is_told`), `schedule/calm.rs` |
+//! | rotator that refuses, position outside its limits | | `gs-server/src/hamlib/tests/rotator.rs`, `hamlib.rs` here |
+//! | rotator or radio that is dead for long | | `mission/tests/station/health.rs` |
+//! | stations file with a wrong field, elements without its satellite | | `gs-server/src/cli/schedule/file.rs`, `gs-server/tests/cli/schedule.rs` |
 #![expect(clippy::expect_used, reason = "a test that cannot be set up has failed, loudly")]
 
 use std::collections::HashMap;

@@ -11,6 +11,7 @@ mod demo;
 mod doctor;
 mod elements;
 mod failure;
+mod hold;
 mod key;
 mod look;
 mod passes;
@@ -98,6 +99,10 @@ pub enum Command {
     Schedule(schedule::Schedule),
     /// What became of plans in passes, or the report of one
     Runs(runs::Runs),
+    /// Take a satellite over from the plan that runs
+    Hold(hold::Hold),
+    /// Give a satellite back to its plan
+    Release(hold::Release),
     /// The antenna's rotator by hand, through rotctld
     #[command(subcommand)]
     Rotator(rotator::Rotator),
@@ -161,6 +166,8 @@ impl Cli {
             Command::Doctor(doctor) => doctor.run(),
             Command::Backup(backup) => backup.run(),
             Command::Restore(restore) => restore.run(),
+            Command::Hold(hold) => hold.run(),
+            Command::Release(release) => release.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

@@ -26,6 +26,7 @@ mod metrics;
 mod page;
 mod plans;
 mod problem;
+mod rehearsals;
 mod routes;
 mod runs;
 mod schedule;
@@ -46,6 +47,7 @@ use std::sync::Arc;
 use axum::Router;
 use axum::middleware::from_fn_with_state;
 use axum::serve::ListenerExt as _;
+use mission::config::Times;
 use mission::{Profile, SatelliteId, Site, StationConfig, StationId};
 use protocol::KeyId;
 use radio::airtime::LinkTiming;
@@ -101,6 +103,8 @@ pub struct Identity {
     pub station: StationId,
     /// Where it stands; `None`: nobody said.
     pub site: Option<Site>,
+    /// When it may transmit, and when it is closed.
+    pub times: Times,
     /// Its satellites.
     pub satellites: Vec<SatelliteIdentity>,
     /// Time, satellite or radio are made up.
@@ -141,6 +145,7 @@ impl Identity {
         Self {
             station: config.station.clone(),
             site: config.site.clone(),
+            times: config.times.clone(),
             satellites: satellites.collect(),
             simulated,
         }
@@ -155,6 +160,7 @@ struct App {
     streams: Arc<Semaphore>,
     /// Turns of those who compute something long.
     computing: Arc<Semaphore>,
+    rehearsals: Arc<rehearsals::Rehearsals>,
 }
 
 /// The API and the page.
@@ -164,6 +170,7 @@ pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
         hosts: Arc::new(allowed_hosts),
         streams: Arc::new(Semaphore::new(STREAMS_MAX)),
         computing: Arc::new(Semaphore::new(sky::COMPUTING_MAX)),
+        rehearsals: Arc::default(),
     };
     routes::table()
         .into_iter()

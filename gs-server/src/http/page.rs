@@ -1,4 +1,4 @@
-//! The first page: static files that are compiled in. No request of it leaves this server.
+//! The pages, one for now and one for the coming days: static files that are compiled in. No request of it leaves this server.
 
 use axum::extract::Path;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -15,12 +15,18 @@ macro_rules! files {
 }
 
 files! {
-    "api.js" "commands.js" "console.css" "dom.js" "events.js" "favicon.svg" "format.js" "heartbeat.js" "links.js"
-    "main.js" "model.js" "notice.js" "passes.js" "picture.js" "stream.js" "tokens.css" "top.js"
+    "agenda.js" "api.js" "coming.js" "commands.js" "console.css" "days.js" "dom.js" "events.js" "favicon.svg" "format.js"
+    "hands.js" "heartbeat.js" "held.js" "links.js" "main.js" "model.js" "notice.js" "passes.js" "picture.js" "plan.css"
+    "plan.js" "runs.js" "stream.js" "tokens.css" "top.js"
 }
 
 pub(super) async fn index(headers: HeaderMap) -> Response {
     answer("text/html; charset=utf-8", include_str!("page/index.html"), &headers)
+}
+
+/// Who gets which pass of the coming days, and what became of it.
+pub(super) async fn plan(headers: HeaderMap) -> Response {
+    answer("text/html; charset=utf-8", include_str!("page/plan.html"), &headers)
 }
 
 pub(super) async fn favicon(headers: HeaderMap) -> Response {

@@ -12,7 +12,7 @@ use super::admit::{Policy, admit};
 use super::write::guard_write;
 use super::{
     App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, metrics, page,
-    plans, runs, schedule, sky, station, status, stream, telemetry,
+    plans, rehearsals, runs, schedule, sky, station, status, stream, telemetry,
 };
 use crate::people::Right::{Command, Look, ManageStation, Plan};
 
@@ -68,6 +68,7 @@ fn stream<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, ha
 pub(super) fn table() -> Vec<Route> {
     vec![
         read("/", Anyone, page::index),
+        read("/plan", Anyone, page::plan),
         read("/favicon.ico", Anyone, page::favicon),
         read("/page/{file}", Anyone, page::file),
         read("/healthz", Anyone, status::alive),
@@ -111,6 +112,10 @@ pub(super) fn table() -> Vec<Route> {
         write("/api/v1/plans/{name}/disarm", Needs(Plan), plans::disarm),
         write("/api/v1/plans/{name}/attach", Needs(Plan), plans::attach),
         write("/api/v1/plans/{name}/detach", Needs(Plan), plans::detach),
+        read("/api/v1/rehearsals", Needs(Look), rehearsals::list),
+        write("/api/v1/rehearsals", Needs(Plan), rehearsals::begin),
+        read("/api/v1/rehearsals/{id}", Needs(Look), rehearsals::get),
+        remove("/api/v1/rehearsals/{id}", Needs(Plan), rehearsals::cancel),
         read("/api/v1/schedule", Needs(Look), schedule::get),
         read("/api/v1/runs", Needs(Look), runs::list),
         read("/api/v1/runs/{id}", Needs(Look), runs::get),

@@ -62,6 +62,8 @@ fn every_verb_tells_what_it_does() {
             "gs-server-rehearse",
             "gs-server-schedule",
             "gs-server-runs",
+            "gs-server-hold",
+            "gs-server-release",
             "gs-server-rotator",
             "gs-server-rotator-probe",
             "gs-server-rotator-point",

@@ -13,6 +13,7 @@ mod plan;
 mod plans;
 mod radio;
 mod rehearse;
+mod schedule;
 mod twin;
 
 use std::ffi::OsStr;

@@ -148,6 +148,10 @@ fn a_plan_is_added_attached_armed_scheduled_and_withdrawn() {
         (&["plan", "arm", "No Name"], 2, "plan:"),
         (&["plan", "attach", "status"], 2, "--at"),
         (&["runs", "99999"], 3, "There is no run 99999"),
+        (&["hold", "pixelsat-1"], 3, "no plan runs for pixelsat-1"),
+        (&["release", "pixelsat-1"], 3, "no plan runs for pixelsat-1"),
+        (&["hold", "nobody"], 3, "nobody"),
+        (&["hold", "../plans"], 2, "satellite:"),
     ] {
         let (found, out, error) = station.verb(words);
         assert_eq!((found, out.as_str()), (code, ""), "{words:?}: {error}");
@@ -160,7 +164,9 @@ fn without_a_server_the_verbs_say_how_to_start_one() {
     let station = Station::new();
     station.write_plan("status");
     let plan = station.plan.clone();
-    for words in [&["plan", "add", &plan][..], &["plan", "list"], &["schedule"], &["runs"]] {
+    for words in
+        [&["plan", "add", &plan][..], &["plan", "list"], &["schedule"], &["runs"], &["hold", "pixelsat-1"]]
+    {
         let (code, out, error) = station.verb(words);
         assert_eq!((code, out.as_str()), (1, ""), "{words:?}: {error}");
         assert!(

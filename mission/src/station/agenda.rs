@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Station;
+use super::health::Fitness;
 use super::runner::Run;
 use crate::clock::{Now, UtcUs};
 use crate::id::{AntennaId, RunId, SatelliteId};
@@ -11,8 +12,8 @@ use crate::plan::{Plan, Progress, RunEnd};
 use crate::record::Record;
 use crate::run::{PlanRecord, RunRecord, RunState};
 use crate::schedule::{
-    self, Antenna, Blackout, Candidate, Contact, Foretold, Health, Partial, PassKey, Policy, Problem,
-    Remembered, Schedule, Scope, identify,
+    self, Antenna, Blackout, Candidate, Contact, Foretold, Partial, PassKey, Policy, Problem, Remembered,
+    Schedule, Scope, identify,
 };
 use crate::sky::{PassAhead, clock_time};
 
@@ -27,6 +28,7 @@ pub(super) struct Agenda {
     pub(super) schedule: Arc<Schedule>,
     names: Vec<Foretold>,
     memory: Vec<Remembered>,
+    pub(super) fitness: Fitness,
     /// Revisions of all skies together, as scheduled last.
     skies: u64,
 }
@@ -44,6 +46,8 @@ struct Match {
 impl Station {
     /// Schedules anew when plans or passes have changed, and brings the planned runs in line.
     pub(super) fn agenda_step(&mut self, now: Now) {
+        let changed = self.fitness_step(now);
+        self.agenda.is_stale |= changed;
         let skies = self.satellites.iter().fold(0_u64, |sum, sat| sum.wrapping_add(sat.sky.revision()));
         if self.site.is_none() || (!self.agenda.is_stale && skies == self.agenda.skies) {
             return;
@@ -67,7 +71,7 @@ impl Station {
         };
         let site = schedule::Site {
             station: self.station.clone(),
-            health: Health::Fit,
+            health: self.agenda.fitness.health(),
             licence: self.times.licence.clone(),
         };
         let blackout = |(window, reason): &(schedule::Window, String)| Blackout {
@@ -75,11 +79,13 @@ impl Station {
             window: *window,
             reason: reason.clone(),
         };
+        let dead = self.satellites.iter().enumerate();
+        let dead = dead.filter_map(|(s, sat)| self.agenda.fitness.blackout(s, &sat.id, now));
         let problem = Problem {
             candidates,
             antennas: vec![antenna],
             sites: vec![site],
-            blackouts: self.times.blackouts.iter().map(blackout).collect(),
+            blackouts: self.times.blackouts.iter().map(blackout).chain(dead).collect(),
             policy: Policy::default(),
         };
         let answer = schedule::plan(&problem, &self.agenda.memory);
@@ -302,9 +308,26 @@ impl Station {
 }
 
 impl Agenda {
-    /// To be drawn up.
-    pub(super) fn stale() -> Self {
-        Self { is_stale: true, ..Self::default() }
+    /// To be drawn up, by what the last life had promised to armed plans: their runs are what was stored of it.
+    pub(super) fn after(runs: &[Run], antenna: &AntennaId) -> Self {
+        let promised = || runs.iter().map(|run| &run.record).filter(|run| run.state == RunState::Planned);
+        let mut names: Vec<Foretold> = Vec::new();
+        for run in promised() {
+            let keys = identify(&run.satellite, &run.station, &names, &[(run.aos_at, run.los_at)]);
+            names.extend(keys.into_iter().map(|key| Foretold { key, aos: run.aos_at, los: run.los_at }));
+        }
+        let remembered = |known: &Foretold| {
+            let (aos_s, los_s) = (-(-known.aos.0).div_euclid(1_000_000), known.los.0.div_euclid(1_000_000));
+            Remembered {
+                key: known.key.clone(),
+                aos_s,
+                los_s,
+                question: 0,
+                chosen: Some((antenna.clone(), aos_s, los_s)),
+                ear: false,
+            }
+        };
+        Self { is_stale: true, memory: names.iter().map(remembered).collect(), names, ..Self::default() }
     }
 
     /// A station has one antenna, and it has the station's name.

@@ -51,8 +51,10 @@ pub(super) fn station(
             Some(Link::new(link.clone(), s, satellites[s].profile.rssi))
         })
         .collect();
+    let (antenna, runs) = (Agenda::antenna(&config.station), runs(&snapshot));
     let mut station = Station {
-        antenna: Agenda::antenna(&config.station),
+        agenda: Agenda::after(&runs, &antenna),
+        antenna,
         station: config.station,
         me: Principal::engine(),
         entropy,
@@ -63,7 +65,7 @@ pub(super) fn station(
         site: config.site,
         times: config.times,
         antenna_fault: None,
-        runs: runs(&snapshot),
+        runs,
         unfinished: snapshot.runs.iter().filter(|run| is_unfinished(&run.progress)).cloned().collect(),
         last_ends: snapshot
             .runs
@@ -71,7 +73,6 @@ pub(super) fn station(
             .filter(|run| run.state == RunState::Ended)
             .map(|run| (run.satellite.clone(), run.los_at))
             .collect(),
-        agenda: Agenda::stale(),
         plans: snapshot.plans,
         ids: snapshot.last_ids,
         last_tx: 0,

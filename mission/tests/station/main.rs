@@ -12,6 +12,7 @@ mod chaos;
 mod clocks;
 mod frames;
 mod gates;
+mod health;
 mod images;
 mod locks;
 mod order;

@@ -18,7 +18,7 @@ use crate::frames::frame;
 use crate::sky::{add, elements, expected, site};
 use crate::world::{S, Setup, UTC0, World};
 
-fn send(telecommand: Telecommand) -> Step {
+pub(crate) fn send(telecommand: Telecommand) -> Step {
     Step {
         action: Action::Send(Send {
             telecommands: vec![telecommand],
@@ -33,7 +33,7 @@ fn send(telecommand: Telecommand) -> Step {
     }
 }
 
-fn plan(name: &str, steps: Vec<Step>) -> Plan {
+pub(crate) fn plan(name: &str, steps: Vec<Step>) -> Plan {
     Plan {
         name: PlanName::new(name).unwrap(),
         satellite: mission::SatelliteId::new("pixelsat-1").unwrap(),
@@ -48,25 +48,25 @@ fn plan(name: &str, steps: Vec<Step>) -> Plan {
     }
 }
 
-fn want(world: &mut World, intent: Intent) -> Result<Accepted, Refusal> {
+pub(crate) fn want(world: &mut World, intent: Intent) -> Result<Accepted, Refusal> {
     let id = world.want(intent);
     world.reply(id).unwrap().clone()
 }
 
-fn hand_over(world: &mut World, plan: Plan) -> Result<Accepted, Refusal> {
+pub(crate) fn hand_over(world: &mut World, plan: Plan) -> Result<Accepted, Refusal> {
     let text: Arc<str> = format!("{plan:?}").into();
     want(world, Intent::AddPlan { plan: Arc::new(plan), text })
 }
 
-fn arm(world: &mut World, name: &str, armed: bool) {
+pub(crate) fn arm(world: &mut World, name: &str, armed: bool) {
     want(world, Intent::ArmPlan { plan: PlanName::new(name).unwrap(), armed }).unwrap();
 }
 
-fn world() -> (World, Vec<PassAhead>) {
+pub(crate) fn world() -> (World, Vec<PassAhead>) {
     world_with(Times::default())
 }
 
-fn world_with(times: Times) -> (World, Vec<PassAhead>) {
+pub(crate) fn world_with(times: Times) -> (World, Vec<PassAhead>) {
     let mut world = World::new(Setup { site: Some(site()), times, ..Setup::default() });
     world.link_state(LinkState::Ok);
     let set = elements(UTC0, 0.0);
@@ -74,12 +74,12 @@ fn world_with(times: Times) -> (World, Vec<PassAhead>) {
     (world, expected(&set, 1, 2))
 }
 
-fn to(world: &mut World, at: UtcUs) {
+pub(crate) fn to(world: &mut World, at: UtcUs) {
     world.pass(u64::try_from(at.0 - world.now.utc.0).unwrap());
 }
 
 /// The newest state of each run.
-fn runs(world: &World) -> Vec<RunRecord> {
+pub(crate) fn runs(world: &World) -> Vec<RunRecord> {
     let mut runs: std::collections::BTreeMap<_, RunRecord> = std::collections::BTreeMap::new();
     for record in &world.stored {
         if let Record::Run(run) = record {
@@ -90,7 +90,7 @@ fn runs(world: &World) -> Vec<RunRecord> {
 }
 
 /// A satellite that beats every minute in view and answers what it is asked, until `until`.
-fn live(world: &mut World, until: UtcUs) {
+pub(crate) fn live(world: &mut World, until: UtcUs) {
     let mut beat = 0_u64;
     // What is on the air at the begin was not answered yet.
     let on_air = world.station.status(world.now).links[0].on_air;
@@ -178,6 +178,8 @@ fn link_that_is_away_is_waited_for_and_a_pass_without_it_is_reported() {
     let (mut world, passes) = world();
     hand_over(&mut world, plan("status", vec![send(Telecommand::Ping)])).unwrap();
     arm(&mut world, "status", true);
+    // So shortly before the pass that the station still counts on it.
+    to(&mut world, passes[0].aos_at.plus(-200_000_000));
     world.link_state(LinkState::Unavailable { reason: "no such port".to_owned() });
     live(&mut world, passes[0].los_at.unwrap().plus(S as i64));
     assert!(matches!(&runs(&world)[0].state, RunState::Missed(why) if why.contains("radio is unavailable")));

@@ -25,6 +25,7 @@ use super::sky::{Moment, Sky, SkyArgs, now};
 use super::{Exit, Failure};
 use crate::config::Config;
 use crate::plan::{Form, check_text, place_findings};
+use crate::rehearsed::answer;
 use crate::sky::Place;
 
 /// Runs of one call.
@@ -79,16 +80,6 @@ pub struct Rehearse {
     json: bool,
 }
 
-/// What was rehearsed, and what came of it.
-struct Answer<'a> {
-    name: &'a str,
-    what: &'a Rehearsal,
-    seed: u64,
-    summary: &'a Summary,
-    outcomes: &'a [Outcome],
-    findings: &'a [PlanFinding],
-}
-
 impl Rehearse {
     pub(super) fn run(self) -> Result<Exit, Failure> {
         if self.seed.checked_add(u64::from(self.runs)).is_none() {
@@ -114,20 +105,13 @@ impl Rehearse {
             .ok_or_else(|| Failure::failed("no run came to its end: give --runs 1 or more"))?;
         let found: Vec<Finding> = warnings(&what).into_iter().chain(summary.warnings()).collect();
         let findings = place_findings(&text, form, found);
-        let answer = Answer {
-            name: &name,
-            what: &what,
-            seed: self.seed,
-            summary: &summary,
-            outcomes: &outcomes,
-            findings: &findings,
-        };
-        if self.json {
-            print_json(&answer.json())?;
-        } else {
-            print_text(&answer.table())?;
-        }
         let is_wrong = findings.iter().any(|finding| finding.severity == Severity::Error.name());
+        let answer = answer(&what, self.seed, &summary, &outcomes, findings);
+        if self.json {
+            print_json(&answer)?;
+        } else {
+            print_text(&tell::table(&answer, &name))?;
+        }
         Ok(if is_wrong || summary.begun == 0 { Exit::Failed } else { Exit::Done })
     }
 

@@ -16,6 +16,9 @@ export function keepToken(text) {
 
 export const hasToken = () => token !== null;
 
+/** An address of this server with the token in its fragment, which never leaves the browser. */
+export const withToken = (path) => (token === null ? path : `${path}#token=${encodeURIComponent(token)}`);
+
 export async function get(path) {
   const answer = await fetch(`/api/v1/${path}`, { headers: { accept: "application/json" }, cache: "no-store" });
   return read(answer);

@@ -1,9 +1,9 @@
 // Telecommands and their stage lights; the hands that send. Enter never sends to the satellite: firing is a held key.
 import { get, hasToken, keepToken, post } from "./api.js";
 import { atMostEvery, byId, make, say } from "./dom.js";
+import { onHold, paintToken, wireToken } from "./hands.js";
 import { model, satellite } from "./model.js";
 
-const HOLD_MS = 800;
 const LIGHTS = ["queued", "sealed", "radiated", "answered"];
 // How many lights a last stage proves; the stages that end badly colour the last of them.
 const REACHED = { queued: 1, sealed: 2, radiating: 2, radiated: 3, answered: 4, rejected: 4, unknown: 3, failed: 1, expired: 1, cancelled: 1 };
@@ -63,22 +63,14 @@ export function paintCommands() {
   byId("ping").disabled = !ready;
   byId("download").disabled = !ready || Boolean(s?.download);
   say(byId("download"), s?.download ? "Bringing image home" : "Hold: Bring image home");
-  byId("token-form").hidden = hasToken();
-  byId("forget").hidden = !hasToken();
+  paintToken();
 }
 
 export function wireHands() {
   onHold(byId("ping"), () => send("commands", { satellite: satellite()?.satellite, command: "Ping" }, (o) => `Ping is queued as #${o.command}.`));
   onHold(byId("download"), () => send("downloads", { satellite: satellite()?.satellite }, (o) => `Download ${o.download} is ordered.`));
-  byId("token-form").addEventListener("submit", (event) => {
-    event.preventDefault();
-    keepToken(byId("token").value);
-    byId("token").value = "";
-    paintCommands();
-  });
-  byId("forget").addEventListener("click", () => {
-    keepToken("");
-    say(byId("command-note"), "Token forgotten.");
+  wireToken((told) => {
+    say(byId("command-note"), told);
     paintCommands();
   });
 }
@@ -94,34 +86,4 @@ async function send(path, body, told) {
     say(note, error.message);
     paintCommands();
   }
-}
-
-/** Fires after the pointer or the space bar was held for 0.8 s; leaving, Esc or letting go is away from danger. */
-function onHold(button, fire) {
-  let timer = null;
-  const begin = () => {
-    if (button.disabled || timer !== null) return;
-    button.classList.add("holding");
-    timer = setTimeout(() => {
-      end();
-      fire();
-    }, HOLD_MS);
-  };
-  const end = () => {
-    clearTimeout(timer);
-    timer = null;
-    button.classList.remove("holding");
-  };
-  button.addEventListener("pointerdown", begin);
-  for (const type of ["pointerup", "pointerleave", "pointercancel", "blur"]) button.addEventListener(type, end);
-  button.addEventListener("contextmenu", (event) => event.preventDefault());
-  button.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") event.preventDefault();
-    else if (event.key === "Escape") end();
-    else if (event.key === " ") {
-      event.preventDefault();
-      if (!event.repeat) begin();
-    }
-  });
-  button.addEventListener("keyup", end);
 }

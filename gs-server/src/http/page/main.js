@@ -1,5 +1,5 @@
 // The first page: reads without a token, follows the stream, paints what it knows.
-import { get, takeTokenFromAddress } from "./api.js";
+import { get } from "./api.js";
 import { paintCommands, refreshCommands, wireHands } from "./commands.js";
 import { addEvent, resetEvents } from "./events.js";
 import { paintHeartbeat, refreshHeartbeat } from "./heartbeat.js";
@@ -11,13 +11,7 @@ import { paintGrid, refreshPicture, resetPicture } from "./picture.js";
 import { follow } from "./stream.js";
 import { paintTop } from "./top.js";
 
-takeTokenFromAddress();
 wireHands();
-// A printed address that is pasted into an open tab changes the fragment only.
-window.addEventListener("hashchange", () => {
-  takeTokenFromAddress();
-  paintCommands();
-});
 window.addEventListener("resize", paintGrid);
 
 function paint() {

@@ -39,12 +39,12 @@ const SETS_MAX: u32 = 1000;
 /// Requests that compute at once.
 pub(super) const COMPUTING_MAX: usize = 4;
 
-fn bad(field: &str, message: impl Into<String>) -> Failure {
+pub(super) fn bad(field: &str, message: impl Into<String>) -> Failure {
     Failure::field(ProblemKind::BadParameter, field, message)
 }
 
 /// Where the station stands.
-fn site(app: &App) -> Result<Site, Failure> {
+pub(super) fn site(app: &App) -> Result<Site, Failure> {
     let place = app.state.identity.site.clone();
     place.ok_or_else(|| {
         Failure::new(
@@ -64,14 +64,14 @@ fn now(app: &App) -> UtcInstant {
 }
 
 /// Satellites with the elements that tell where they are in a window.
-struct Known {
-    objects: Vec<Object>,
+pub(super) struct Known {
+    pub(super) objects: Vec<Object>,
     /// Asked for, and without elements.
     without: Vec<String>,
 }
 
 /// The one that is named, or all.
-async fn known(
+pub(super) async fn known(
     app: &App,
     named: Option<&str>,
     (start, stop): (UtcInstant, UtcInstant),
@@ -110,7 +110,7 @@ async fn known(
 }
 
 /// Computes beside the event loop, when it is this request's turn.
-async fn compute<T: Send + 'static>(
+pub(super) async fn compute<T: Send + 'static>(
     app: &App,
     work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
 ) -> Result<T, Failure> {
@@ -149,7 +149,7 @@ fn window(
     Ok((start, stop))
 }
 
-fn check_calendar(field: &str, at: UtcInstant) -> Result<(), Failure> {
+pub(super) fn check_calendar(field: &str, at: UtcInstant) -> Result<(), Failure> {
     if (UtcInstant::EARLIEST..=UtcInstant::LATEST).contains(&at) {
         Ok(())
     } else {

@@ -5,6 +5,7 @@ mod operations;
 mod page;
 mod plans;
 mod reads;
+mod rehearsals;
 mod security;
 mod sky;
 mod stream;

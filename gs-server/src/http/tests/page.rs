@@ -9,9 +9,15 @@ use crate::clock::wall_sleep;
 #[tokio::test]
 async fn every_file_that_the_page_names_is_served_with_its_type() {
     let bench = Bench::new().await;
-    let index = bench.get("/").await;
-    assert_eq!(index.header("content-type"), "text/html; charset=utf-8");
-    let mut texts = vec![String::from_utf8(index.bytes).unwrap()];
+    let mut texts = Vec::new();
+    for path in ["/", "/plan"] {
+        let page = bench.get(path).await;
+        assert_eq!(page.header("content-type"), "text/html; charset=utf-8");
+        assert!(page.header("content-security-policy").contains("default-src 'self'"), "{path}");
+        texts.push(String::from_utf8(page.bytes).unwrap());
+    }
+    // From each page the other is a click away.
+    assert!(texts.iter().all(|text| text.contains("href=\"/\"") && text.contains("href=\"/plan\"")));
     texts.extend(FILES.iter().map(|(_, text)| (*text).to_owned()));
     for (name, _) in FILES {
         let file = bench.get(&format!("/page/{name}")).await;
@@ -36,9 +42,13 @@ async fn every_file_that_the_page_names_is_served_with_its_type() {
 
 #[test]
 fn data_reaches_the_page_as_text_only_and_nothing_is_fetched_from_elsewhere() {
-    let index = include_str!("../page/index.html");
-    assert!(!index.contains("<style") && !index.contains(" style=") && !index.contains(" onclick"));
-    assert!(index.matches("<script").count() == 1 && index.contains("src=\"/page/main.js\""));
+    for (page, module) in
+        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js")]
+    {
+        assert!(!page.contains("<style") && !page.contains(" style=") && !page.contains(" onclick"));
+        assert_eq!(page.matches("<script").count(), 1);
+        assert!(page.contains(&format!("src=\"/page/{module}\"")));
+    }
     for (name, text) in FILES {
         for forbidden in [
             "innerHTML",
@@ -50,11 +60,41 @@ fn data_reaches_the_page_as_text_only_and_nothing_is_fetched_from_elsewhere() {
             "sessionStorage",
             "document.cookie",
             "@import",
+            "setAttribute(\"style",
         ] {
             assert!(!text.contains(forbidden), "{name} has {forbidden}");
         }
         let text = text.replace("http://www.w3.org/2000/svg", "");
         assert!(!text.contains("http://") && !text.contains("https://"), "{name} leads elsewhere");
+    }
+}
+
+/// Every element that a page's module asks for by its id is in that page.
+#[test]
+fn what_a_module_looks_for_is_in_its_page() {
+    let module = |name: &str| FILES.iter().find(|(known, _)| *known == name).map_or("", |(_, text)| text);
+    for (page, first) in
+        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js")]
+    {
+        let mut names = vec![first.to_owned()];
+        let mut at = 0;
+        while at < names.len() {
+            let text = module(&names[at]);
+            assert!(!text.is_empty(), "{} is missing", names[at]);
+            for name in text.split("from \"./").skip(1).filter_map(|rest| rest.split('"').next()) {
+                if !names.iter().any(|known| known == name) {
+                    names.push(name.to_owned());
+                }
+            }
+            at += 1;
+        }
+        for id in names.iter().flat_map(|name| module(name).split("byId(\"").skip(1)) {
+            let id = id.split('"').next().unwrap();
+            // What another module of the same page paints only where it is called.
+            let elsewhere =
+                first == "plan.js" && include_str!("../page/index.html").contains(&format!("id=\"{id}\""));
+            assert!(page.contains(&format!("id=\"{id}\"")) || elsewhere, "{first}: no element {id}");
+        }
     }
 }
 

@@ -1,0 +1,66 @@
+//! A satellite that passes when a test wants it: real elements, turned so that a real pass begins at a given time.
+
+use api::FineTime;
+use serde_json::{Value, json};
+
+use crate::Folder;
+use crate::process::{gs_server, run};
+
+/// What stands in the station's section: where it is.
+pub const PLACE: &str = "latitude_deg = 46.5191\nlongitude_deg = 6.5668\nheight_m = 410\n";
+/// What stands in the satellite's section: which elements are its own.
+pub const NUMBER: &str = "norad_cat_id = 100123\n";
+/// Degrees that the Earth turns in a second, against the stars.
+const EARTH_DEG_S: f64 = 360.985_647_3 / 86_400.0;
+
+fn omm(epoch_us: i64, raan_deg: f64) -> Value {
+    let epoch = FineTime::from_unix_us(epoch_us).to_string();
+    json!([{
+        "OBJECT_NAME": "SAT", "OBJECT_ID": "2026-101C", "NORAD_CAT_ID": 100_123,
+        "EPOCH": epoch.trim_end_matches('Z'), "MEAN_MOTION": 15.2, "ECCENTRICITY": 0.001,
+        "INCLINATION": 97.4, "RA_OF_ASC_NODE": raan_deg.rem_euclid(360.0), "ARG_OF_PERICENTER": 20, "MEAN_ANOMALY": 30,
+        "BSTAR": 0.0001, "MEAN_MOTION_DOT": 0.00001,
+    }])
+}
+
+/// The passes of a day over the station, as the program tells them: AOS, duration in seconds, greatest elevation.
+fn passes(folder: &Folder, omm: &Value, start_us: i64) -> Vec<(i64, f64, f64)> {
+    let file = folder.file("overhead.json");
+    std::fs::write(&file, omm.to_string()).expect("a file");
+    let start = FineTime::from_unix_us(start_us).to_string();
+    let mut command =
+        gs_server(["passes", "--json", "--station", "46.5191,6.5668,410", "--start", &start, "--elements"]);
+    command.arg(file);
+    let (code, out, error) = run(command);
+    assert_eq!(code, 0, "{error}");
+    let told: Value = serde_json::from_str(&out).expect("JSON");
+    let number = |pass: &Value, name: &str| pass[name].as_f64().expect("a number");
+    let us = |text: &Value| {
+        text.as_str().and_then(|text| text.parse::<FineTime>().ok()).expect("a time").unix_us()
+    };
+    let list = told["passes"].as_array().expect("passes");
+    list.iter()
+        .map(|pass| (us(&pass["aos"]), number(pass, "duration_s"), number(pass, "max_elevation_deg")))
+        .collect()
+}
+
+/// Elements by which a pass of eight minutes at least begins at this time, to a few seconds.
+///
+/// # Panics
+/// When the sky cannot be arranged so.
+#[must_use]
+pub fn elements(folder: &Folder, aos_us: i64) -> String {
+    let (epoch_us, raan_deg) = (aos_us - 7_200_000_000, 10.0);
+    let found = passes(folder, &omm(epoch_us, raan_deg), epoch_us);
+    let good = found
+        .iter()
+        .find(|(at, lasts_s, high)| *at > epoch_us + 600_000_000 && *lasts_s > 500.0 && *high > 30.0);
+    let (at, ..) = good.expect("a day has a good pass");
+    // Everything so much earlier, and the orbit's plane turned back with the Earth.
+    let shift_us = aos_us - at;
+    let turned = omm(epoch_us + shift_us, raan_deg + EARTH_DEG_S * shift_us as f64 / 1e6);
+    let found = passes(folder, &turned, aos_us - 600_000_000);
+    let is_so = found.iter().any(|(at, lasts_s, _)| at.abs_diff(aos_us) < 5_000_000 && *lasts_s > 480.0);
+    assert!(is_so, "{found:?} has no pass at {aos_us}");
+    turned.to_string()
+}
