@@ -15,12 +15,21 @@ macro_rules! files {
 }
 
 files! {
-    "api.js" "commands.js" "console.css" "dom.js" "events.js" "favicon.svg" "format.js" "heartbeat.js" "links.js"
-    "main.js" "model.js" "notice.js" "passes.js" "picture.js" "stream.js" "tokens.css" "top.js"
+    "api.js" "commands.js" "console.css" "dom.js" "door.css" "door.js" "events.js" "favicon.svg" "format.js"
+    "heartbeat.js" "links.js" "login.js" "main.js" "model.js" "notice.js" "passes.js" "picture.js"
+    "session.js" "stream.js" "tokens.css" "top.js" "welcome.js"
 }
 
 pub(super) async fn index(headers: HeaderMap) -> Response {
     answer("text/html; charset=utf-8", include_str!("page/index.html"), &headers)
+}
+
+pub(super) async fn login(headers: HeaderMap) -> Response {
+    answer("text/html; charset=utf-8", include_str!("page/login.html"), &headers)
+}
+
+pub(super) async fn welcome(headers: HeaderMap) -> Response {
+    answer("text/html; charset=utf-8", include_str!("page/welcome.html"), &headers)
 }
 
 pub(super) async fn favicon(headers: HeaderMap) -> Response {

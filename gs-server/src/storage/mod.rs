@@ -20,6 +20,7 @@ mod convert_sky;
 mod error;
 mod lock;
 mod open;
+mod people;
 mod progress;
 mod read;
 mod redecode;
@@ -45,6 +46,8 @@ use crate::witness::WitnessFolder;
 
 pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
 pub use error::StoreError;
+pub(crate) use people::PeopleChange;
+pub use people::{ApprovalRow, LinkRow, SessionRow, StationLicenceRow, TokenRow, TransmissionRow, UserRow};
 pub use read::{
     Bucket, ChunkState, CommandLife, CommandNow, CommandQuery, Counts, EventQuery, FrameQuery, Heard,
     HeardCounts, ImageBytes, ImageMap, LatestValue, Page, Sample, Samples, Scope, Series, TelemetryQuery,

@@ -1,4 +1,4 @@
-// The first page: reads without a token, follows the stream, paints what it knows.
+// The first page: reads, follows the stream, paints what it knows.
 import { get, takeTokenFromAddress } from "./api.js";
 import { paintCommands, refreshCommands, wireHands } from "./commands.js";
 import { addEvent, resetEvents } from "./events.js";
@@ -8,11 +8,13 @@ import { model, satellite, takeStation } from "./model.js";
 import { paintNotice } from "./notice.js";
 import { paintPasses } from "./passes.js";
 import { paintGrid, refreshPicture, resetPicture } from "./picture.js";
+import { refreshSession, wireSession } from "./session.js";
 import { follow } from "./stream.js";
 import { paintTop } from "./top.js";
 
 takeTokenFromAddress();
 wireHands();
+wireSession(paintCommands);
 // A printed address that is pasted into an open tab changes the fragment only.
 window.addEventListener("hashchange", () => {
   takeTokenFromAddress();
@@ -55,6 +57,10 @@ function refreshAll() {
 }
 
 async function begin() {
+  if (!(await refreshSession())) {
+    location.replace("/login");
+    return;
+  }
   const [station, events] = await Promise.all([get("station"), get("events?limit=100")]);
   takeStation(station);
   for (const event of events.items.toReversed()) addEvent(event);

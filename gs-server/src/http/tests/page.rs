@@ -12,6 +12,11 @@ async fn every_file_that_the_page_names_is_served_with_its_type() {
     let index = bench.get("/").await;
     assert_eq!(index.header("content-type"), "text/html; charset=utf-8");
     let mut texts = vec![String::from_utf8(index.bytes).unwrap()];
+    for door in ["/login", "/welcome"] {
+        let door = bench.get(door).await;
+        assert_eq!(door.header("content-type"), "text/html; charset=utf-8");
+        texts.push(String::from_utf8(door.bytes).unwrap());
+    }
     texts.extend(FILES.iter().map(|(_, text)| (*text).to_owned()));
     for (name, _) in FILES {
         let file = bench.get(&format!("/page/{name}")).await;
