@@ -137,8 +137,6 @@ kinds! {
     UserExists 409 "user-exists" "The name is taken";
     /// Without an administrator nobody could let anybody in.
     LastAdministrator 409 "last-administrator" "Somebody must stay administrator";
-    /// Another person has to say yes first.
-    ApprovalNeeded 409 "approval-needed" "Another person has to approve this";
     /// This approval cannot be given.
     ApprovalRefused 409 "approval-refused" "This cannot be approved like that";
     /// The token is another.

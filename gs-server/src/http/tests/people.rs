@@ -362,3 +362,65 @@ async fn behind_tls_the_cookie_and_the_origin_are_stricter() {
     let two = Browser { cookie: format!("{0}; {0}", hosted.cookie), csrf: String::new() };
     assert_eq!(bench.send(two.read("/api/v1/station")).await.problem(), "login-required");
 }
+
+/// What the record of the first transmission says, when somebody has had a Ping sent.
+async fn first_transmission(ask: impl AsyncFn(&Bench) -> Request<Body>) -> Value {
+    let bench = Bench::with_people(|settings| {
+        settings.open_reading = Some(true);
+        settings.call_sign = "DL0STA".to_owned();
+        settings.licence = "club".to_owned();
+    })
+    .await;
+    let root = bench.somebody("root-admin", Role::Administrator).await;
+    bench.somebody("otto", Role::Operator).await;
+    let body = json!({"call_sign": "DL1OTT", "licence": "class A"});
+    bench.send(root.write(Method::POST, "/api/v1/users/otto", "a", &body)).await.ok();
+    let ask = ask(&bench).await;
+    bench.send(ask).await.ok();
+    for _ in 0..1000 {
+        let found = bench.get("/api/v1/transmissions").await.ok();
+        if let Some(first) = found["items"].get(0) {
+            let mut first = first.clone();
+            assert!(first["at"].is_string() && first["link"] == "e22", "{first}");
+            first.as_object_mut().unwrap().retain(|key, _| {
+                ["command", "attempt", "principal", "person", "call_sign", "licence"].contains(&key.as_str())
+            });
+            return first;
+        }
+        crate::clock::wall_sleep(std::time::Duration::from_millis(10)).await;
+    }
+    panic!("nothing was radiated");
+}
+
+#[tokio::test]
+async fn each_transmission_says_who_answered_for_it() {
+    let ping = || json!({"command": "Ping", "gate": "blind"});
+    let by_person = first_transmission(async |bench: &Bench| {
+        let otto = bench.somebody("otto", Role::Operator).await;
+        otto.write(Method::POST, "/api/v1/commands", "k", &ping())
+    });
+    assert_eq!(
+        by_person.await,
+        json!({"command": 1, "attempt": 1, "principal": "otto", "person": "otto", "call_sign": "DL1OTT", "licence": "class A"})
+    );
+    let by_machine = first_transmission(async |bench: &Bench| {
+        let root = bench.somebody("root-admin", Role::Administrator).await;
+        let body = json!({"name": "script", "scopes": ["command"], "days": 1, "owner": "otto"});
+        let made = bench.send(root.write(Method::POST, "/api/v1/tokens", "t", &body)).await.ok();
+        let bearer = format!("Bearer {}", made["secret"].as_str().unwrap());
+        let mut request = super::write("/api/v1/commands", "k").body(Body::from(ping().to_string())).unwrap();
+        request.headers_mut().insert("authorization", bearer.parse().unwrap());
+        request
+    });
+    assert_eq!(
+        by_machine.await,
+        json!({"command": 1, "attempt": 1, "principal": "token:script", "person": "otto", "call_sign": "DL1OTT", "licence": "class A"})
+    );
+    let by_machine_of_nobody = first_transmission(async |_: &Bench| {
+        super::write("/api/v1/commands", "k").body(Body::from(ping().to_string())).unwrap()
+    });
+    assert_eq!(
+        by_machine_of_nobody.await,
+        json!({"command": 1, "attempt": 1, "principal": "local", "person": null, "call_sign": "DL0STA", "licence": "club"})
+    );
+}

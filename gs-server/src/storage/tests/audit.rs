@@ -31,8 +31,7 @@ async fn head_is_noted(folder: &Path, row: i64) {
         if text.starts_with(&format!("{row}:")) {
             return;
         }
-        tokio::task::yield_now().await;
-        std::thread::sleep(std::time::Duration::from_millis(2));
+        crate::clock::wall_sleep(std::time::Duration::from_millis(2)).await;
     }
     panic!("the head of row {row} was never noted");
 }
