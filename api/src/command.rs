@@ -61,6 +61,9 @@ pub struct Outcome {
     pub command: Option<u64>,
     /// The download concerned.
     pub download: Option<u64>,
+    /// What has to be approved by a second person: `/approvals/{id}`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub approval: Option<u64>,
 }
 
 /// What happened.
@@ -75,6 +78,8 @@ pub enum OutcomeWord {
     DownloadOrdered,
     /// The download is withdrawn.
     DownloadCancelled,
+    /// Nothing yet: a second person has to approve it.
+    AwaitingApproval,
     /// Done.
     Done,
 }

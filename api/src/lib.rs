@@ -13,6 +13,8 @@
 //! | [`PassList`], [`LookList`], [`PassKept`], [`ElementsView`] | what is in the sky, with [`FineTime`] to the microsecond |
 //! | [`ElementsRequest`], [`HeldElements`], [`FetchReport`] | elements: given, held, fetched |
 //! | [`PlanText`], [`PlanView`], [`ScheduleView`], [`RunReport`] | plans, which pass gets which, and what came of it |
+//! | [`SessionView`], [`UserView`], [`TokenView`] | who may come in |
+//! | [`ApprovalView`], [`TransmissionView`] | what a second person has to approve; who answered for a radiation |
 //! | [`StreamMessage`] | what the WebSocket says |
 //! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
 //!
@@ -30,6 +32,7 @@ mod event;
 mod frame;
 mod image;
 mod page;
+mod people;
 mod plan;
 mod problem;
 mod rehearsal;
@@ -53,6 +56,10 @@ pub use event::{AuditView, EventView, LimitView};
 pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
 pub use image::{ChunkMap, ImageView};
 pub use page::{Nothing, Page};
+pub use people::{
+    ApprovalView, ApproveRequest, LinkMade, LoginRequest, PasswordRequest, RefuseRequest, SessionView,
+    TokenMade, TokenRequest, TokenView, TransmissionView, UserChange, UserRequest, UserView, WelcomeRequest,
+};
 pub use plan::{
     ApprovalText, AtLosWord, AttachText, ConditionText, GuardText, MinPassText, OnFailureWord, PlanFinding,
     PlanText, StepText,

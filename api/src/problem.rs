@@ -20,6 +20,9 @@ pub struct Problem {
     /// The fields that are wrong.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub errors: Vec<FieldError>,
+    /// Try again after so many seconds.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub retry_after_s: Option<u64>,
 }
 
 /// One field that is wrong.
@@ -42,6 +45,7 @@ impl Problem {
             detail: detail.into(),
             instance: None,
             errors: Vec::new(),
+            retry_after_s: None,
         }
     }
 
@@ -133,8 +137,6 @@ kinds! {
     UserExists 409 "user-exists" "The name is taken";
     /// Without an administrator nobody could let anybody in.
     LastAdministrator 409 "last-administrator" "Somebody must stay administrator";
-    /// Another person has to say yes first.
-    ApprovalNeeded 409 "approval-needed" "Another person has to approve this";
     /// This approval cannot be given.
     ApprovalRefused 409 "approval-refused" "This cannot be approved like that";
     /// The token is another.

@@ -22,7 +22,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 
 use crate::clock::{ScaledClock, SystemClock, Timer, Wire};
-use crate::config::{Changes, Config, ConfigError, station_config};
+use crate::config::{Changes, Config, ConfigError, TwoPerson, station_config};
 use crate::elements::task::ElementsTask;
 use crate::elements::{Door, ElementsHandle, Fetcher, Wanted};
 use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, OsEntropy};
@@ -33,6 +33,7 @@ use crate::keys::{self, KeyError};
 use crate::lifecycle::{Lifecycle, TaskFailure};
 use crate::links::{self, LinkParts};
 use crate::ops::{sd, upkeep::UpkeepTask};
+use crate::people::{People, PeopleSettings};
 use crate::pointing::{Place, Steering};
 use crate::storage::reserve::ReserveError;
 use crate::storage::{EventQuery, Page, Store, StoreError, StoreOptions};
@@ -106,6 +107,8 @@ pub struct Ready {
     pub store: Store,
     /// The clock.
     pub timer: Arc<dyn Timer>,
+    /// Who may come in.
+    pub people: People,
 }
 
 /// How a run ended well.
@@ -234,6 +237,7 @@ pub async fn run_with(
         .map_err(|source| RunError::Io { what: "the listener has no address", source })?;
     // After the archive: the token file may lie in its folder, which is made with it.
     let token = Token::load_or_create(&config.token_file())?;
+    let people = people(&config, &store, &timer, address).await?;
     let snapshot = snapshot(&store, &station).await?;
     let recovered = store.reserve_read().await?;
     if !recovered.is_empty() {
@@ -302,6 +306,7 @@ pub async fn run_with(
         radios: radios_on_air,
         timer: Arc::clone(&timer),
         token,
+        people: people.clone(),
         identity,
         demo,
         stop: api.soft.clone(),
@@ -325,6 +330,7 @@ pub async fn run_with(
             hub,
             store: store.clone(),
             timer: Arc::clone(&timer),
+            people,
         };
         // Nobody has to wait for it.
         let _ = ready.send(is);
@@ -353,6 +359,27 @@ pub async fn run_with(
     }
     tracing::info!("stopped");
     Ok(Report { abandoned_tasks })
+}
+
+/// Who may come in. Sessions and links run on this machine's clock, however fast the station's own goes.
+async fn people(
+    config: &Config,
+    store: &Store,
+    timer: &Arc<dyn Timer>,
+    address: SocketAddr,
+) -> Result<People, StoreError> {
+    let settings = PeopleSettings {
+        two_person: config.people.two_person == TwoPerson::Critical,
+        approval_us: (config.people.approval_h * 3.6e9) as i64,
+        https: config.http.https,
+        open_reading: config.http.open_reading,
+        on_loopback: address.ip().to_canonical().is_loopback(),
+        station: config.station.name.clone(),
+        call_sign: config.station.call_sign.clone(),
+        licence: config.station.licence_text.clone(),
+    };
+    let station_clock = Arc::clone(timer);
+    People::open(store.clone(), settings, Arc::new(SystemClock::new()), station_clock).await
 }
 
 /// Keys are in memory: no crash may write them to a disk.

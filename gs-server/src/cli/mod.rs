@@ -3,6 +3,7 @@
 //! What a script may read goes to standard output (with `--json` as one object, or one object a line); everything said
 //! to a person besides goes to standard error. Exit codes are those of [`Exit`], explained in `docs/cli.md`.
 
+mod approve;
 mod audit;
 mod backup;
 mod config;
@@ -27,7 +28,9 @@ mod schedule;
 mod serve;
 mod shell;
 mod sky;
+mod token;
 mod twin;
+mod user;
 
 pub use failure::{Exit, Failure};
 
@@ -121,6 +124,18 @@ pub enum Command {
     Backup(backup::Backup),
     /// Make a data folder out of a backup
     Restore(backup::Restore),
+    /// Who may come in: users, their roles and one-time links
+    #[command(subcommand)]
+    User(user::User),
+    /// Tokens of machines
+    #[command(subcommand)]
+    Token(token::Token),
+    /// What waits for a second person
+    Approvals(approve::Approvals),
+    /// Say yes to what another person asked for
+    Approve(approve::Approve),
+    /// Say no to it, or take back what one asked for oneself
+    Refuse(approve::Refuse),
     /// Derive every value again from the raw frames
     Redecode(redecode::Redecode),
 }
@@ -168,6 +183,11 @@ impl Cli {
             Command::Restore(restore) => restore.run(),
             Command::Hold(hold) => hold.run(),
             Command::Release(release) => release.run(),
+            Command::User(user) => user.run(),
+            Command::Token(token) => token.run(),
+            Command::Approvals(approvals) => approvals.run(),
+            Command::Approve(approve) => approve.run(),
+            Command::Refuse(refuse) => refuse.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 use super::shell::{print_json, print_line, runtime, signals};
 use super::{Exit, Failure, SetLogFilter};
 use crate::config::{Config, ConfigError};
-use crate::run::{RunError, RunOptions, run_with};
+use crate::run::{Ready, RunError, RunOptions, run_with};
 use crate::storage::StoreError;
 
 /// `gs-server serve`.
@@ -42,6 +42,9 @@ struct ReadyLine {
     ready: bool,
     address: SocketAddr,
     url: String,
+    /// While nobody is let in: where the first administrator begins.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    welcome: Option<String>,
 }
 
 impl Serve {
@@ -85,10 +88,16 @@ impl Serve {
         tokio::spawn(async move {
             if let Ok(ready) = is_ready.await {
                 let url = format!("http://{}/", ready.address);
+                let welcome = welcome(&ready, &url).await;
                 let told = if self.json {
-                    print_json(&ReadyLine { ready: true, address: ready.address, url })
+                    print_json(&ReadyLine { ready: true, address: ready.address, url, welcome })
                 } else {
-                    print_line(format_args!("gs-server ready at {url}"))
+                    print_line(format_args!("gs-server ready at {url}")).and_then(|()| match welcome {
+                        Some(link) => print_line(format_args!(
+                            "nobody is let in yet: the first administrator begins at {link} (once, within 24 h)"
+                        )),
+                        None => Ok(()),
+                    })
                 };
                 if let Err(error) = told {
                     tracing::warn!("{error}");
@@ -100,6 +109,17 @@ impl Serve {
             Ok(Exit::Done)
         } else {
             Err(Failure::failed(format!("{} tasks did not end in time", report.abandoned_tasks)))
+        }
+    }
+}
+
+/// The one-time link of the first administrator, as long as nobody is let in.
+async fn welcome(ready: &Ready, url: &str) -> Option<String> {
+    match ready.people.first_welcome().await {
+        Ok(path) => path.map(|path| format!("{}{path}", url.trim_end_matches('/'))),
+        Err(error) => {
+            tracing::warn!(%error, "no link for the first administrator could be made: {error}");
+            None
         }
     }
 }

@@ -80,6 +80,7 @@ impl Config {
         self.check_storage()?;
         self.check_elements()?;
         self.check_ops()?;
+        self.check_people()?;
         self.rotator.as_ref().map_or(Ok(()), super::RotatorSection::check)?;
         self.rig.as_ref().map_or(Ok(()), super::RigSection::check)?;
         self.check_simulated()
@@ -109,6 +110,27 @@ impl Config {
             format!("{} bytes", self.storage.reserve_bytes),
             "Give 65,536 to 4,294,967,296.",
         )
+    }
+
+    fn check_people(&self) -> Checked {
+        ensure(
+            (0.01..=168.0).contains(&self.people.approval_h),
+            "people.approval_h",
+            format!("{} hours", self.people.approval_h),
+            "Give 0.01 to 168.",
+        )?;
+        for (key, text) in [
+            ("station.call_sign", &self.station.call_sign),
+            ("station.licence_text", &self.station.licence_text),
+        ] {
+            ensure(
+                text.chars().count() <= 64 && !text.chars().any(char::is_control),
+                key,
+                "it is too long, or not printable",
+                "Give at most 64 printable characters.",
+            )?;
+        }
+        Ok(())
     }
 
     fn check_simulated(&self) -> Checked {

@@ -50,7 +50,8 @@ pub use ops::{BackupSection, DiskSection, RetentionSection};
 pub use reload::Changes;
 pub use satellites::{CounterSetting, LimitSection, SatelliteSection, Thresholds};
 pub use server::{
-    ClockSetting, HttpSection, LogSection, SimulationSection, StationSection, StorageSection, WindowSection,
+    ClockSetting, HttpSection, LogSection, PeopleSection, SimulationSection, StationSection, StorageSection,
+    TwoPerson, WindowSection,
 };
 pub use station::{driver_config, station_config};
 
@@ -80,6 +81,9 @@ pub struct Config {
     /// Who may talk to the server, and where.
     #[serde(default)]
     pub http: HttpSection,
+    /// Rules among those who may come in.
+    #[serde(default)]
+    pub people: PeopleSection,
     /// What is logged.
     #[serde(default)]
     pub log: LogSection,

@@ -45,6 +45,12 @@ pub struct StationSection {
     /// Nothing is planned in these windows.
     #[serde(default)]
     pub blackouts: Vec<WindowSection>,
+    /// The station's call sign: stands in the record of transmissions by whoever has none of his own. Default: none.
+    #[serde(default)]
+    pub call_sign: String,
+    /// The licence that goes with it, in words. Default: none.
+    #[serde(default)]
+    pub licence_text: String,
     /// What the antenna needs from one satellite to the next, seconds. Default 30.
     #[serde(default = "half_a_minute")]
     pub switch_over_s: u32,
@@ -178,8 +184,13 @@ pub struct HttpSection {
     pub listen: SocketAddr,
     /// Names under which browsers and programs may address the server, besides loopback (`Host` header).
     pub allowed_hosts: Vec<String>,
-    /// The 0600 file with the token that every write needs. Default `token` in the data folder.
+    /// The 0600 file with the server's own token: whoever can read it may do everything. Default `token` in the data
+    /// folder.
     pub token_file: Option<PathBuf>,
+    /// Browsers reach the server over TLS, through a proxy on this machine. Default false.
+    pub https: bool,
+    /// Whether one may look without logging in. Default: on loopback, as long as there is no user.
+    pub open_reading: Option<bool>,
 }
 
 impl Default for HttpSection {
@@ -188,8 +199,37 @@ impl Default for HttpSection {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8700)),
             allowed_hosts: Vec::new(),
             token_file: None,
+            https: false,
+            open_reading: None,
         }
     }
+}
+
+/// `[people]`: rules among those who may come in.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PeopleSection {
+    /// What needs a second person. Default `off`.
+    pub two_person: TwoPerson,
+    /// How long the second person has, hours: 0.01 to 168. Default 1.
+    pub approval_h: f64,
+}
+
+impl Default for PeopleSection {
+    fn default() -> Self {
+        Self { two_person: TwoPerson::Off, approval_h: 1.0 }
+    }
+}
+
+/// What needs a second person.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TwoPerson {
+    /// Nothing.
+    #[default]
+    Off,
+    /// Critical telecommands, and arming plans with such.
+    Critical,
 }
 
 /// `[log]`: what is logged.

@@ -82,10 +82,12 @@ impl fmt::Display for Config {
         }
         write!(
             f,
-            "http {}: hosts {:?}, token in {}",
+            "http {}: hosts {:?}, token in {}{}; two persons: {:?}",
             self.http.listen,
             self.http.allowed_hosts,
-            self.token_file().display()
+            self.token_file().display(),
+            if self.http.https { ", behind TLS" } else { "" },
+            self.people.two_person,
         )?;
         if let Some(rotator) = &self.rotator {
             write!(

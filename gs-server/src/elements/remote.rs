@@ -89,6 +89,32 @@ impl Remote {
         })
     }
 
+    /// The same, as somebody else.
+    #[must_use]
+    pub fn with_token(self, token: Token) -> Self {
+        Self { token, ..self }
+    }
+
+    /// Anything that can be written, with an answer of its own shape.
+    ///
+    /// # Errors
+    /// [`RemoteError`].
+    pub async fn make<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        body: &impl serde::Serialize,
+    ) -> Result<T, RemoteError> {
+        self.ask(Method::POST, path, body, PATIENCE).await
+    }
+
+    /// Takes something back, with an answer of its own shape.
+    ///
+    /// # Errors
+    /// [`RemoteError`].
+    pub async fn take_back<T: DeserializeOwned>(&self, path: &str) -> Result<T, RemoteError> {
+        self.ask(Method::DELETE, path, &api::Nothing {}, PATIENCE).await
+    }
+
     /// What is held: one page.
     ///
     /// # Errors
@@ -206,15 +232,11 @@ impl Remote {
         patience: Duration,
     ) -> Result<T, RemoteError> {
         let url = self.url(path)?;
-        let mut bearer = HeaderValue::try_from(format!("Bearer {}", self.token.reveal()))
-            .map_err(|error| RemoteError::Client(error.to_string()))?;
-        bearer.set_sensitive(true);
         let body = serde_json::to_vec(body).map_err(|error| RemoteError::Client(error.to_string()))?;
         let request = self
             .client
             .request(method, url.clone())
             .timeout(patience)
-            .header(AUTHORIZATION, bearer)
             .header(CONTENT_TYPE, "application/json")
             .header("idempotency-key", uuid::Uuid::new_v4().to_string())
             .body(body);
@@ -225,7 +247,10 @@ impl Remote {
         let no_answer =
             |error: reqwest::Error| RemoteError::NoAnswer { url: url.to_string(), why: chain(&error) };
         let strange = |why: String| RemoteError::Strange { url: url.to_string(), why };
-        let mut response = request.send().await.map_err(no_answer)?;
+        let mut bearer = HeaderValue::try_from(format!("Bearer {}", self.token.reveal()))
+            .map_err(|error| RemoteError::Client(error.to_string()))?;
+        bearer.set_sensitive(true);
+        let mut response = request.header(AUTHORIZATION, bearer).send().await.map_err(no_answer)?;
         let status = response.status();
         let mut body = Vec::new();
         while let Some(chunk) = response.chunk().await.map_err(no_answer)? {

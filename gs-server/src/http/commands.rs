@@ -75,7 +75,7 @@ pub(super) async fn cancel(
     write.submit(&app, Intent::Cancel(CommandId(id.0))).await
 }
 
-fn intent(app: &App, request: &CommandRequest) -> Result<CommandIntent, Failure> {
+pub(super) fn intent(app: &App, request: &CommandRequest) -> Result<CommandIntent, Failure> {
     let telecommand = telecommand::parse(&request.command, &request.arguments).map_err(|errors| {
         let told: Vec<String> = errors.iter().map(ToString::to_string).collect();
         let problem = Problem::new(ProblemKind::BadArgument, told.join("; "));

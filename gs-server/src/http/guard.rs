@@ -56,9 +56,10 @@ fn check_host(app: &App, request: &Request) -> Result<(), Failure> {
 
 /// Pages of another origin may not write nor follow the stream: browsers do not apply the same-origin rule to
 /// WebSockets. Programs send no Origin.
-pub(super) fn check_origin(headers: &HeaderMap) -> Result<(), Failure> {
+pub(super) fn check_origin(headers: &HeaderMap, https: bool) -> Result<(), Failure> {
     let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or("");
-    let is_own = |origin: &HeaderValue| origin.to_str().is_ok_and(|origin| is_same_origin(origin, host));
+    let is_own =
+        |origin: &HeaderValue| origin.to_str().is_ok_and(|origin| is_same_origin(origin, host, https));
     if headers.get_all(header::ORIGIN).iter().all(is_own) {
         return Ok(());
     }

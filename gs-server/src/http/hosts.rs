@@ -58,9 +58,9 @@ fn has_port(name: &str) -> bool {
     }
 }
 
-/// Whether `origin` is a page of the very server that `host` names.
-pub(super) fn is_same_origin(origin: &str, host: &str) -> bool {
-    let name = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+/// Whether `origin` is a page of the very server that `host` names, and came to the browser as it should.
+pub(super) fn is_same_origin(origin: &str, host: &str, https: bool) -> bool {
+    let name = origin.strip_prefix(if https { "https://" } else { "http://" });
     name.is_some_and(|name| name.eq_ignore_ascii_case(host))
 }
 
@@ -109,8 +109,10 @@ mod tests {
 
     #[test]
     fn an_origin_must_name_the_same_host_and_port() {
-        assert!(is_same_origin("http://localhost:8700", "localhost:8700"));
-        assert!(is_same_origin("https://ground.example.org", "ground.example.org"));
+        assert!(is_same_origin("http://localhost:8700", "localhost:8700", false));
+        assert!(is_same_origin("https://ground.example.org", "ground.example.org", true));
+        assert!(!is_same_origin("http://ground.example.org", "ground.example.org", true));
+        assert!(!is_same_origin("https://ground.example.org", "ground.example.org", false));
         for bad in [
             "null",
             "http://localhost:8701",
@@ -118,7 +120,7 @@ mod tests {
             "file://",
             "http://localhost:8700.evil.example",
         ] {
-            assert!(!is_same_origin(bad, "localhost:8700"), "{bad}");
+            assert!(!is_same_origin(bad, "localhost:8700", false), "{bad}");
         }
     }
 }

@@ -4,12 +4,14 @@
 //! one guard (names under which we answer, problems, security headers), around every route its door (`admit`: origin, who
 //! asks, the right), around every write another (idempotency key, JSON). One file per group of operations; `problem` is the only place that turns errors into answers.
 //!
-//! Reading needs no token: whoever can reach the port may look. Every write needs a right.
+//! Looking needs nobody only on loopback and while there is no user, or where the configuration says so. Every write
+//! needs a right.
 //!
 //! What it does **not** do: decide anything (intents go to the engine), know SQL (the store answers), read a clock.
 
 mod admit;
 mod antenna;
+mod approvals;
 mod clock;
 mod commands;
 mod downloads;
@@ -24,12 +26,15 @@ mod keys;
 mod links;
 mod metrics;
 mod page;
+mod people;
 mod plans;
 mod problem;
 mod rehearsals;
+mod release;
 mod routes;
 mod runs;
 mod schedule;
+mod session;
 mod sky;
 mod station;
 mod status;
@@ -60,6 +65,7 @@ use crate::elements::ElementsHandle;
 use crate::engine::EngineHandle;
 use crate::hamlib::AntennaHandle;
 use crate::hub::Hub;
+use crate::people::People;
 use crate::storage::Store;
 
 pub use antenna::RadioOnAir;
@@ -86,8 +92,10 @@ pub struct HttpState {
     pub radios: Vec<RadioOnAir>,
     /// The station's time, simulated or not.
     pub timer: Arc<dyn Timer>,
-    /// What every write must show.
+    /// The token of the server's own file: whoever can read it may do everything.
     pub token: Token,
+    /// Everybody else.
+    pub people: People,
     /// Who we are.
     pub identity: Identity,
     /// What a demo tells of itself; shown in the station's view.
@@ -195,5 +203,6 @@ pub async fn serve(
             tracing::debug!(%error, "A connection keeps Nagle's algorithm.");
         }
     });
+    let router = router.into_make_service_with_connect_info::<std::net::SocketAddr>();
     axum::serve(listener, router).with_graceful_shutdown(stop.cancelled_owned()).await
 }

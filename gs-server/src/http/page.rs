@@ -15,9 +15,10 @@ macro_rules! files {
 }
 
 files! {
-    "agenda.js" "api.js" "coming.js" "commands.js" "console.css" "days.js" "dom.js" "events.js" "favicon.svg" "format.js"
-    "hands.js" "heartbeat.js" "held.js" "links.js" "main.js" "model.js" "notice.js" "passes.js" "picture.js" "plan.css"
-    "plan.js" "runs.js" "stream.js" "tokens.css" "top.js"
+    "agenda.js" "api.js" "coming.js" "commands.js" "console.css" "days.js" "dom.js" "door.css" "door.js"
+    "events.js" "favicon.svg" "format.js" "hands.js" "heartbeat.js" "held.js" "links.js" "login.js" "main.js"
+    "model.js" "notice.js" "passes.js" "picture.js" "plan.css" "plan.js" "runs.js" "session.js" "stream.js"
+    "tokens.css" "top.js" "welcome.js"
 }
 
 pub(super) async fn index(headers: HeaderMap) -> Response {
@@ -27,6 +28,14 @@ pub(super) async fn index(headers: HeaderMap) -> Response {
 /// Who gets which pass of the coming days, and what became of it.
 pub(super) async fn plan(headers: HeaderMap) -> Response {
     answer("text/html; charset=utf-8", include_str!("page/plan.html"), &headers)
+}
+
+pub(super) async fn login(headers: HeaderMap) -> Response {
+    answer("text/html; charset=utf-8", include_str!("page/login.html"), &headers)
+}
+
+pub(super) async fn welcome(headers: HeaderMap) -> Response {
+    answer("text/html; charset=utf-8", include_str!("page/welcome.html"), &headers)
 }
 
 pub(super) async fn favicon(headers: HeaderMap) -> Response {

@@ -7,6 +7,7 @@ use mission::Refusal;
 use mission::plan::Finding;
 
 use crate::engine::IntentError;
+use crate::people::PeopleError;
 use crate::storage::StoreError;
 
 /// What a handler answers when it cannot do what it was asked.
@@ -69,6 +70,43 @@ impl From<StoreError> for Failure {
             "The archive could not be read for a request."
         );
         Self::new(ProblemKind::Internal, detail)
+    }
+}
+
+impl From<PeopleError> for Failure {
+    fn from(error: PeopleError) -> Self {
+        let told = error.to_string();
+        let (kind, field) = match error {
+            PeopleError::Store(error) => return error.into(),
+            PeopleError::NoRandomness => (ProblemKind::Internal, None),
+            PeopleError::Busy => (ProblemKind::Overloaded, None),
+            PeopleError::BadPassword { .. } => (ProblemKind::BadPassword, Some("password")),
+            PeopleError::WrongPassword => (ProblemKind::WrongPassword, None),
+            PeopleError::RateLimited { seconds } => {
+                let mut problem = Problem::new(ProblemKind::RateLimited, told);
+                problem.retry_after_s = Some(seconds);
+                return Self(Box::new(problem));
+            }
+            PeopleError::SessionReplayed => (ProblemKind::SessionReplayed, None),
+            PeopleError::LinkRefused => (ProblemKind::LinkRefused, None),
+            PeopleError::BadName { .. } | PeopleError::NameMissing => {
+                (ProblemKind::BadArgument, Some("name"))
+            }
+            PeopleError::BadText { field } | PeopleError::Wrong { field, .. } => {
+                (ProblemKind::BadArgument, Some(field))
+            }
+            PeopleError::UnknownUser(_) => (ProblemKind::UnknownUser, None),
+            PeopleError::NameTaken(_) => (ProblemKind::UserExists, Some("name")),
+            PeopleError::LastAdministrator(_) => (ProblemKind::LastAdministrator, None),
+            PeopleError::UnknownToken(_) | PeopleError::UnknownApproval(_) => (ProblemKind::NotFound, None),
+            PeopleError::TooMuch(_) => (ProblemKind::Forbidden, Some("scopes")),
+            PeopleError::NotApproved(_) => (ProblemKind::ApprovalRefused, None),
+        };
+        let problem = Problem::new(kind, told.clone());
+        Self(Box::new(match field {
+            Some(field) => problem.with_field(field, told),
+            None => problem,
+        }))
     }
 }
 
@@ -156,6 +194,7 @@ pub(super) fn render(mut response: Response, path: &str) -> Response {
         }
     };
     problem.instance = Some(path.to_owned());
+    let retry_after_s = problem.retry_after_s;
     let body = serde_json::to_vec(&problem).unwrap_or_default();
     let status = StatusCode::from_u16(problem.status).unwrap_or(status);
     let mut rendered = (status, body).into_response();
@@ -171,7 +210,7 @@ pub(super) fn render(mut response: Response, path: &str) -> Response {
         headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     }
     if matches!(status, StatusCode::TOO_MANY_REQUESTS | StatusCode::SERVICE_UNAVAILABLE) {
-        headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+        headers.insert(header::RETRY_AFTER, HeaderValue::from(retry_after_s.unwrap_or(1)));
     }
     rendered
 }

@@ -7,14 +7,14 @@ use axum::handler::Handler;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{MethodRouter, delete, get, post};
 
-use super::admit::Policy::{Anyone, Needs};
+use super::admit::Policy::{Anyone, LoggedIn, Needs};
 use super::admit::{Policy, admit};
-use super::write::guard_write;
+use super::write::{guard_door, guard_write};
 use super::{
-    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, metrics, page,
-    plans, rehearsals, runs, schedule, sky, station, status, stream, telemetry,
+    App, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys, links, metrics,
+    page, people, plans, rehearsals, runs, schedule, session, sky, station, status, stream, telemetry,
 };
-use crate::people::Right::{Command, Look, ManageStation, Plan};
+use crate::people::Right::{Approve, Command, Look, ManagePeople, ManageStation, Plan};
 
 /// What a path is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +25,8 @@ pub(super) enum Access {
     Write,
     /// The same by DELETE.
     Remove,
+    /// As a write, by somebody who is not known yet: no idempotency key.
+    Door,
     /// WebSocket: the origin checked.
     Stream,
 }
@@ -41,6 +43,7 @@ impl Route {
     pub(super) fn add_to(self, router: Router<App>, app: &App) -> Router<App> {
         let handler = match self.access {
             Access::Write | Access::Remove => self.handler.route_layer(from_fn(guard_write)),
+            Access::Door => self.handler.route_layer(from_fn(guard_door)),
             Access::Read | Access::Stream => self.handler,
         };
         let door = (app.clone(), self.policy, self.access);
@@ -60,6 +63,10 @@ fn remove<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, ha
     Route { path, access: Access::Remove, policy, handler: delete(handler) }
 }
 
+fn door<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, handler: H) -> Route {
+    Route { path, access: Access::Door, policy, handler: post(handler) }
+}
+
 fn stream<T: 'static, H: Handler<T, App>>(path: &'static str, policy: Policy, handler: H) -> Route {
     Route { path, access: Access::Stream, policy, handler: get(handler) }
 }
@@ -74,6 +81,27 @@ pub(super) fn table() -> Vec<Route> {
         read("/healthz", Anyone, status::alive),
         read("/readyz", Anyone, status::ready),
         read("/metrics", Needs(Look), metrics::get),
+        read("/login", Anyone, page::login),
+        read("/welcome", Anyone, page::welcome),
+        read("/api/v1/session", Anyone, session::get),
+        door("/api/v1/session", Anyone, session::log_in),
+        remove("/api/v1/session", LoggedIn, session::log_out),
+        write("/api/v1/session/end-all", LoggedIn, session::log_out_everywhere),
+        write("/api/v1/session/password", LoggedIn, session::change_password),
+        door("/api/v1/welcome", Anyone, session::welcome),
+        write("/api/v1/welcome/link", Needs(ManagePeople), people::first_link),
+        read("/api/v1/users", Needs(ManagePeople), people::users),
+        write("/api/v1/users", Needs(ManagePeople), people::add_user),
+        write("/api/v1/users/{name}", Needs(ManagePeople), people::change_user),
+        write("/api/v1/users/{name}/link", Needs(ManagePeople), people::user_link),
+        read("/api/v1/tokens", Needs(ManagePeople), people::tokens),
+        write("/api/v1/tokens", Needs(ManagePeople), people::new_token),
+        remove("/api/v1/tokens/{name}", Needs(ManagePeople), people::revoke_token),
+        read("/api/v1/approvals", Needs(Look), approvals::list),
+        read("/api/v1/approvals/{id}", Needs(Look), approvals::get),
+        write("/api/v1/approvals/{id}/approve", Needs(Approve), approvals::approve),
+        write("/api/v1/approvals/{id}/refuse", Needs(Command), approvals::refuse),
+        read("/api/v1/transmissions", Needs(Look), approvals::transmissions),
         read("/api/v1/health", Anyone, status::health),
         read("/api/v1/version", Needs(Look), status::version),
         read("/api/v1/station", Needs(Look), station::get),

@@ -23,6 +23,7 @@ use super::extract::Query;
 use super::problem::Failure;
 use super::{events, station};
 use crate::clock::{wall_sleep, within};
+use crate::people::Caller;
 use crate::storage::{EventQuery, Page, StoreError, StoredEvent};
 
 /// Bytes that a client's message may have; it has nothing to say.
@@ -50,6 +51,7 @@ pub(super) struct Asked {
 pub(super) async fn open(
     State(app): State<App>,
     Query(asked): Query<Asked>,
+    caller: Caller,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Failure> {
     let upgrade = upgrade.map_err(|_| {
@@ -66,7 +68,7 @@ pub(super) async fn open(
     Ok(upgrade.on_upgrade(move |socket| async move {
         let metrics = app.state.engine.metrics().clone();
         let open = metrics.stream();
-        let mut follower = Follower { app, socket, last: 0, unanswered: 0 };
+        let mut follower = Follower { app, caller, socket, last: 0, unanswered: 0 };
         let why = follower.follow(asked.after).await;
         drop(open);
         metrics.stream_ended(why.word());
@@ -88,6 +90,8 @@ enum End {
     Stopping,
     /// The archive cannot be read.
     Archive,
+    /// Whoever follows may not look any more.
+    LoggedOut,
 }
 
 impl End {
@@ -99,12 +103,15 @@ impl End {
             Self::Talks => "talks",
             Self::Stopping => "stopping",
             Self::Archive => "archive",
+            Self::LoggedOut => "logged-out",
         }
     }
 }
 
 struct Follower {
     app: App,
+    /// Who follows.
+    caller: Caller,
     socket: WebSocket,
     /// The last event that was sent, or that the client had.
     last: i64,
@@ -128,6 +135,8 @@ impl Follower {
         self.status().await?;
 
         let app = self.app.clone();
+        let caller = self.caller.clone();
+        let mut gone = Box::pin(app.state.people.until_gone(&caller));
         let mut status = app.state.engine.status_changes();
         let mut status_due = Box::pin(wall_sleep(STATUS_QUIET));
         let mut status_allowed = Box::pin(wall_sleep(STATUS_PAUSE));
@@ -137,6 +146,7 @@ impl Follower {
             tokio::select! {
                 biased;
                 () = app.state.stop.cancelled() => return ControlFlow::Break(End::Stopping),
+                () = &mut gone => return ControlFlow::Break(End::LoggedOut),
                 heard = self.socket.recv() => self.hear(heard)?,
                 event = hub.recv() => self.pass_on(event).await?,
                 () = &mut status_allowed, if !may_tell => may_tell = true,
@@ -262,6 +272,7 @@ impl Follower {
             End::TooSlow => (close_code::POLICY, "too slow: nothing was taken for 10 s"),
             End::Talks => (close_code::UNSUPPORTED, "this stream takes no messages"),
             End::Stopping => (close_code::AWAY, "the server is stopping"),
+            End::LoggedOut => (close_code::POLICY, "logged out: log in again"),
             End::Archive => (close_code::ERROR, "the archive cannot be read at present"),
         };
         let frame = CloseFrame { code, reason: Utf8Bytes::from_static(reason) };

@@ -1,4 +1,4 @@
-//! The token that every write needs, on loopback too: whoever can read its 0600 file is an operator.
+//! The server's own token: whoever can read its 0600 file owns the machine, and may do everything.
 
 use std::fmt;
 use std::fs::{File, OpenOptions};
@@ -82,7 +82,11 @@ impl Token {
         }
     }
 
-    fn load(path: &Path) -> Result<Self, TokenError> {
+    /// Reads a token file.
+    ///
+    /// # Errors
+    /// As [`Self::load_or_create`]; [`TokenError::Io`] when there is none.
+    pub fn load(path: &Path) -> Result<Self, TokenError> {
         let failed = |source| TokenError::Io { path: path.to_owned(), source };
         let no_follow = OFlags::NOFOLLOW | OFlags::NONBLOCK;
         let file = OpenOptions::new()

@@ -18,8 +18,9 @@ use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
 use super::App;
-use super::admit::Caller;
 use super::problem::Failure;
+use super::release::{Came, Pass, pass};
+use crate::people::Caller;
 
 /// Bytes that a body may have.
 pub(super) const BODY_MAX: usize = 64 * 1024;
@@ -30,8 +31,9 @@ const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 pub(super) const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 
 /// Who writes what, checked.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 struct Checked {
+    caller: Caller,
     principal: Principal,
     idempotency_key: String,
     digest: [u8; 32],
@@ -40,19 +42,29 @@ struct Checked {
 
 /// Around every write.
 pub(super) async fn guard_write(request: Request, next: Next) -> Response {
-    match check(request).await {
+    guarded(request, next, true).await
+}
+
+/// Around the doors, where nobody is known yet and nothing is done twice: the same, without idempotency key.
+pub(super) async fn guard_door(request: Request, next: Next) -> Response {
+    guarded(request, next, false).await
+}
+
+async fn guarded(request: Request, next: Next, wants_key: bool) -> Response {
+    match check(request, wants_key).await {
         Ok(request) => next.run(request).await,
         Err(failure) => failure.into_response(),
     }
 }
 
-async fn check(request: Request) -> Result<Request, Failure> {
+async fn check(request: Request, wants_key: bool) -> Result<Request, Failure> {
     let (mut parts, body) = request.into_parts();
-    let caller = parts.extensions.get::<Caller>().and_then(|caller| caller.principal.clone());
-    let principal = caller.ok_or_else(|| {
-        Failure::new(ProblemKind::LoginRequired, "Nobody is named as the one who asks: log in at /login.")
+    let caller = parts.extensions.get::<Caller>().cloned().ok_or_else(|| {
+        tracing::error!(path = parts.uri.path(), "A write is outside the table.");
+        Failure::new(ProblemKind::Internal, "This path cannot be written.")
     })?;
-    let idempotency_key = idempotency_key(&parts.headers)?;
+    let principal = Principal::new(caller.name());
+    let idempotency_key = if wants_key { idempotency_key(&parts.headers)? } else { String::new() };
     let declared = parts.headers.get(header::CONTENT_TYPE);
     let is_json = declared.and_then(|value| value.to_str().ok()).is_some_and(is_json);
     if declared.is_some() && !is_json {
@@ -67,7 +79,13 @@ async fn check(request: Request) -> Result<Request, Failure> {
         false => serde_json::from_slice(&body)
             .map_err(|error| Failure::new(ProblemKind::BadJson, format!("The body is not JSON: {error}.")))?,
     };
-    parts.extensions.insert(Checked { principal, idempotency_key, digest: digest(&parts, &body), body });
+    parts.extensions.insert(Checked {
+        caller,
+        principal,
+        idempotency_key,
+        digest: digest(&parts, &body),
+        body,
+    });
     Ok(Request::from_parts(parts, axum::body::Body::empty()))
 }
 
@@ -147,7 +165,12 @@ impl<T> Write<T> {
 
     /// Asks the engine, and answers when what it did is durable.
     pub(super) async fn submit(self, app: &App, intent: Intent) -> Result<Response, Failure> {
-        let Checked { principal, idempotency_key, digest, .. } = self.checked;
+        let Checked { caller, principal, idempotency_key, digest, body } = self.checked;
+        let came = Came { caller: &caller, idempotency_key: &idempotency_key, digest, body: &body };
+        let _same_plans = match pass(app, came, &intent).await? {
+            Pass::Go(same_plans) => same_plans,
+            Pass::Wait { approval, replayed } => return Ok(awaiting(approval, replayed)),
+        };
         let done = app.state.engine.intent(principal, idempotency_key, digest, intent).await?;
         let (outcome, location) = outcome(&done.accepted);
         let status = if location.is_some() && !done.replayed { StatusCode::CREATED } else { StatusCode::OK };
@@ -162,8 +185,27 @@ impl<T> Write<T> {
     }
 }
 
-fn outcome(accepted: &Accepted) -> (Outcome, Option<String>) {
-    let plain = |outcome| Outcome { outcome, command: None, download: None };
+/// Nothing is done yet: where to look.
+fn awaiting(approval: u64, replayed: bool) -> Response {
+    let outcome = Outcome {
+        outcome: OutcomeWord::AwaitingApproval,
+        command: None,
+        download: None,
+        approval: Some(approval),
+    };
+    let mut response = (StatusCode::ACCEPTED, Json(outcome)).into_response();
+    let headers = response.headers_mut();
+    if let Ok(location) = HeaderValue::try_from(format!("/api/v1/approvals/{approval}")) {
+        headers.insert(header::LOCATION, location);
+    }
+    if replayed {
+        headers.insert(IDEMPOTENCY_REPLAYED, HeaderValue::from_static("true"));
+    }
+    response
+}
+
+pub(super) fn outcome(accepted: &Accepted) -> (Outcome, Option<String>) {
+    let plain = |outcome| Outcome { outcome, command: None, download: None, approval: None };
     match *accepted {
         Accepted::Command(id) => (
             Outcome { command: Some(id.0), ..plain(OutcomeWord::CommandQueued) },

@@ -22,6 +22,7 @@ mod error;
 mod inspect;
 mod lock;
 mod open;
+mod people;
 mod progress;
 mod read;
 mod redecode;
@@ -50,6 +51,8 @@ pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
 pub use backup::{DatabaseFacts, copy_database, examine_database};
 pub use error::StoreError;
 pub use inspect::{Inspection, inspect_database};
+pub(crate) use people::PeopleChange;
+pub use people::{ApprovalRow, LinkRow, SessionRow, StationLicenceRow, TokenRow, TransmissionRow, UserRow};
 pub use read::{
     Bucket, ChunkState, CommandLife, CommandNow, CommandQuery, Counts, EventQuery, FrameQuery, Heard,
     HeardCounts, ImageBytes, ImageMap, LatestValue, Page, Sample, Samples, Scope, Series, TelemetryQuery,

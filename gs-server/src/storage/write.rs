@@ -6,7 +6,7 @@ use mission::record::{
     AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, PassRecord,
     ReceptionRssi, Record, Route, StageRecord, TelemetryRecord,
 };
-use mission::{Batch, StationId};
+use mission::{Batch, Stage, StationId};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, Connection as _, Row as _, SqliteConnection};
 
@@ -239,12 +239,12 @@ impl Transaction<'_> {
         Ok(None)
     }
 
-    async fn insert<R: Row>(&mut self, row: &R) -> Result<(), StoreError> {
+    pub(super) async fn insert<R: Row>(&mut self, row: &R) -> Result<(), StoreError> {
         row.bind(sqlx::query(R::INSERT)).execute(&mut *self.connection).await?;
         Ok(())
     }
 
-    async fn upsert<R: Row>(&mut self, key: &'static str, row: &R) -> Result<(), StoreError> {
+    pub(super) async fn upsert<R: Row>(&mut self, key: &'static str, row: &R) -> Result<(), StoreError> {
         row.bind(sqlx::query(upsert::<R>(key))).execute(&mut *self.connection).await?;
         Ok(())
     }
@@ -322,7 +322,11 @@ impl Transaction<'_> {
                 StageRow::of(record, &route, &text("key")?)?
             }
         };
-        self.insert(&row).await
+        self.insert(&row).await?;
+        if record.stage == Stage::Radiating {
+            self.responsible(&row).await?;
+        }
+        Ok(())
     }
 
     async fn telemetry(&mut self, record: &TelemetryRecord) -> Result<(), StoreError> {
@@ -440,7 +444,7 @@ impl Transaction<'_> {
         Ok(StoredEvent { sequence, record: record.clone() })
     }
 
-    async fn audit(&mut self, record: &AuditRecord) -> Result<(), StoreError> {
+    pub(super) async fn audit(&mut self, record: &AuditRecord) -> Result<(), StoreError> {
         let row = AuditRow {
             id: self.memory.last_audit + 1,
             station: self.station.to_string(),

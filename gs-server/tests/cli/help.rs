@@ -82,6 +82,18 @@ fn every_verb_tells_what_it_does() {
             "gs-server-backup",
             "gs-server-backup-verify",
             "gs-server-restore",
+            "gs-server-user",
+            "gs-server-user-add",
+            "gs-server-user-list",
+            "gs-server-user-link",
+            "gs-server-user-change",
+            "gs-server-token",
+            "gs-server-token-new",
+            "gs-server-token-list",
+            "gs-server-token-revoke",
+            "gs-server-approvals",
+            "gs-server-approve",
+            "gs-server-refuse",
             "gs-server-redecode",
         ]
     );

@@ -1,5 +1,5 @@
 // Telecommands and their stage lights; the hands that send. Enter never sends to the satellite: firing is a held key.
-import { get, hasToken, keepToken, post } from "./api.js";
+import { get, keepToken, maySend, post } from "./api.js";
 import { atMostEvery, byId, make, say } from "./dom.js";
 import { onHold, paintToken, wireToken } from "./hands.js";
 import { model, satellite } from "./model.js";
@@ -59,7 +59,7 @@ function lights(command) {
 export function paintCommands() {
   const s = satellite();
   say(byId("queued"), s && s.queued > 0 ? `${s.queued} waiting` : "");
-  const ready = hasToken() && model.live;
+  const ready = maySend() && model.live;
   byId("ping").disabled = !ready;
   byId("download").disabled = !ready || Boolean(s?.download);
   say(byId("download"), s?.download ? "Bringing image home" : "Hold: Bring image home");

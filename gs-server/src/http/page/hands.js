@@ -1,5 +1,5 @@
 // What hands need on every page: keys that must be held, and the token.
-import { hasToken, keepToken, takeTokenFromAddress, withToken } from "./api.js";
+import { hasToken, keepToken, maySend, takeTokenFromAddress, withToken } from "./api.js";
 import { byId } from "./dom.js";
 
 const HOLD_MS = 800;
@@ -65,6 +65,6 @@ export function wireToken(changed) {
 }
 
 export function paintToken() {
-  byId("token-form").hidden = hasToken();
+  byId("token-form").hidden = maySend();
   byId("forget").hidden = !hasToken();
 }

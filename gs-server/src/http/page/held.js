@@ -1,6 +1,6 @@
 // Plans in use: what they want, whether they may run; arming is a held key, disarming is not.
 import { agenda } from "./agenda.js";
-import { get, hasToken, keepToken, post } from "./api.js";
+import { get, keepToken, mayPlan, post } from "./api.js";
 import { byId, make, say } from "./dom.js";
 import { clock, date, ms } from "./format.js";
 import { onHold, paintToken } from "./hands.js";
@@ -14,7 +14,7 @@ let shown = "";
 const rehearsals = new Map(); // newest RehearsalView or error by plan
 
 export function paintHeld(refresh) {
-  const ready = hasToken() && model.live;
+  const ready = mayPlan() && model.live;
   const key = JSON.stringify([agenda.plans, ready, [...rehearsals]]);
   if (key === shown) return;
   shown = key;

@@ -1,4 +1,4 @@
-// The first page: reads without a token, follows the stream, paints what it knows.
+// The first page: reads, follows the stream, paints what it knows.
 import { get } from "./api.js";
 import { paintCommands, refreshCommands, wireHands } from "./commands.js";
 import { addEvent, resetEvents } from "./events.js";
@@ -8,10 +8,12 @@ import { model, satellite, takeStation } from "./model.js";
 import { paintNotice } from "./notice.js";
 import { paintPasses } from "./passes.js";
 import { paintGrid, refreshPicture, resetPicture } from "./picture.js";
+import { refreshSession, wireSession } from "./session.js";
 import { follow } from "./stream.js";
 import { paintTop } from "./top.js";
 
 wireHands();
+wireSession(paintCommands);
 window.addEventListener("resize", paintGrid);
 
 function paint() {
@@ -49,6 +51,10 @@ function refreshAll() {
 }
 
 async function begin() {
+  if (!(await refreshSession())) {
+    location.replace("/login");
+    return;
+  }
   const [station, events] = await Promise.all([get("station"), get("events?limit=100")]);
   takeStation(station);
   for (const event of events.items.toReversed()) addEvent(event);

@@ -8,6 +8,7 @@ import { paintToken, wireToken } from "./hands.js";
 import { paintHeld } from "./held.js";
 import { model, now, takeStation } from "./model.js";
 import { paintNotice } from "./notice.js";
+import { refreshSession, wireSession } from "./session.js";
 import { refreshRuns } from "./runs.js";
 import { follow } from "./stream.js";
 import { agenda, inOrder } from "./agenda.js";
@@ -21,6 +22,7 @@ wireToken((told) => {
   say(byId("held-note"), told);
   paintAll();
 });
+wireSession(paintAll);
 window.addEventListener("resize", atMostEvery(200, async () => paintDays()));
 
 const refresh = atMostEvery(1000, async () => {
@@ -74,6 +76,10 @@ function onEvent(event) {
 }
 
 async function begin() {
+  if (!(await refreshSession())) {
+    location.replace("/login");
+    return;
+  }
   const [station, events] = await Promise.all([get("station"), get("events?limit=1")]);
   takeStation(station);
   refresh();

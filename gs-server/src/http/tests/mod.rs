@@ -3,21 +3,27 @@
 mod elements;
 mod operations;
 mod page;
+mod people;
 mod plans;
 mod reads;
 mod rehearsals;
 mod security;
 mod sky;
 mod stream;
+mod two_persons;
 mod writes;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
 use axum::Router;
 use axum::body::{Body, to_bytes};
 use axum::http::{Method, Request, StatusCode, header};
-use mission::{LinkConfig, LinkId, Profile, SatelliteConfig, SatelliteId, Source, StationConfig, StationId};
+use mission::{
+    Clock, LinkConfig, LinkId, MonoUs, Now, Profile, SatelliteConfig, SatelliteId, Source, StationConfig,
+    StationId, UtcUs,
+};
 use protocol::{ChunkIndex, Downlink, FrameForm, Heartbeat, ImageChunk, ImageInfo, Key, encode_down};
 use radio::airtime::{LinkTiming, LoraPhy};
 use serde_json::{Value, json};
@@ -32,6 +38,7 @@ use crate::config::ClockSetting;
 use crate::elements::{ElementsHandle, Wanted};
 use crate::engine::{Engine, EngineInbox, EngineMessage, EngineParts, LinkPort, OsEntropy};
 use crate::hub::Hub;
+use crate::people::{People, PeopleSettings};
 use crate::storage::{Store, StoreOptions};
 
 const HOST: &str = "127.0.0.1:8700";
@@ -45,6 +52,9 @@ struct Bench {
     inbox: EngineInbox,
     stop: CancellationToken,
     timer: Arc<dyn Timer>,
+    people: People,
+    /// The clock of people.
+    hands: Arc<Hands>,
     _folder: TempDir,
 }
 
@@ -63,7 +73,18 @@ impl Bench {
         Self::listening(station, "127.0.0.1:8700".parse().unwrap()).await
     }
 
+    /// With other rules about people.
+    async fn with_people(rules: impl FnOnce(&mut PeopleSettings)) -> Self {
+        let mut settings = people_settings();
+        rules(&mut settings);
+        Self::built(station(), HOST.parse().unwrap(), settings).await
+    }
+
     async fn listening(station: StationConfig, address: std::net::SocketAddr) -> Self {
+        Self::built(station, address, people_settings()).await
+    }
+
+    async fn built(station: StationConfig, address: std::net::SocketAddr, settings: PeopleSettings) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(StoreOptions {
             folder: folder.path().join("data"),
@@ -91,6 +112,10 @@ impl Bench {
             hub: hub.clone(),
             links: vec![port],
         });
+        let hands = Arc::new(Hands::default());
+        let clock: Arc<dyn Clock> = Arc::clone(&hands) as Arc<dyn Clock>;
+        let station_clock: Arc<dyn Clock> = Arc::clone(&timer) as Arc<dyn Clock>;
+        let people = People::open(store.clone(), settings, clock, station_clock).await.unwrap();
         let stop = CancellationToken::new();
         tokio::spawn(engine.run(stop.clone(), stop.clone()));
         // A radio that takes everything and never answers.
@@ -114,14 +139,23 @@ impl Bench {
             }],
             timer: Arc::clone(&timer),
             token: Token::new(TOKEN).unwrap(),
+            people: people.clone(),
             identity,
             demo: Some(json!({"speed": 1.0})),
             stop: stop.clone(),
         };
         let router = router(state, AllowedHosts::new(address, &[HOST.to_owned()]));
-        let bench = Self { router, store, hub, inbox, stop, timer, _folder: folder };
+        let bench = Self { router, store, hub, inbox, stop, timer, people, hands, _folder: folder };
         // The engine tells that it began; tests count from there.
-        bench.until("/api/v1/station", "/last_sequence", &json!(1)).await;
+        for _ in 0..500 {
+            if bench.store.last_event_seq().await.unwrap() == 1 {
+                break;
+            }
+            wall_sleep(Duration::from_millis(10)).await;
+        }
+        if bench.people.is_reading_open().await.unwrap() {
+            bench.until("/api/v1/station", "/last_sequence", &json!(1)).await;
+        }
         bench
     }
 
@@ -186,6 +220,31 @@ impl Bench {
         let bench = Self::listening(station(), address).await;
         tokio::spawn(serve(listener, bench.router.clone(), bench.stop.clone()));
         (bench, address)
+    }
+}
+
+fn people_settings() -> PeopleSettings {
+    PeopleSettings { on_loopback: true, station: "bench".to_owned(), ..PeopleSettings::default() }
+}
+
+/// A clock that goes when it is told to.
+#[derive(Default)]
+struct Hands(AtomicI64);
+
+impl Hands {
+    fn pass_h(&self, hours: f64) {
+        self.0.fetch_add((hours * 3.6e9) as i64, Ordering::Relaxed);
+    }
+}
+
+impl Clock for Hands {
+    fn now(&self) -> Now {
+        let us = self.0.load(Ordering::Relaxed);
+        Now { mono: MonoUs(us.cast_unsigned()), utc: UtcUs(1_795_000_000_000_000 + us) }
+    }
+
+    fn is_simulated(&self) -> bool {
+        true
     }
 }
 

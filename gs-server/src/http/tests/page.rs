@@ -10,14 +10,14 @@ use crate::clock::wall_sleep;
 async fn every_file_that_the_page_names_is_served_with_its_type() {
     let bench = Bench::new().await;
     let mut texts = Vec::new();
-    for path in ["/", "/plan"] {
+    for path in ["/", "/plan", "/login", "/welcome"] {
         let page = bench.get(path).await;
         assert_eq!(page.header("content-type"), "text/html; charset=utf-8");
         assert!(page.header("content-security-policy").contains("default-src 'self'"), "{path}");
         texts.push(String::from_utf8(page.bytes).unwrap());
     }
     // From each page the other is a click away.
-    assert!(texts.iter().all(|text| text.contains("href=\"/\"") && text.contains("href=\"/plan\"")));
+    assert!(texts.iter().take(2).all(|text| text.contains("href=\"/\"") && text.contains("href=\"/plan\"")));
     texts.extend(FILES.iter().map(|(_, text)| (*text).to_owned()));
     for (name, _) in FILES {
         let file = bench.get(&format!("/page/{name}")).await;

@@ -1,10 +1,14 @@
-//! Every write is tried in every wrong way; the route table says what there is.
+//! Every path is tried in every wrong way; the route table says what there is.
 
 use axum::body::Body;
 use axum::http::{Method, Request, header};
+use serde_json::json;
 
-use super::super::routes::{Access, table};
+use super::super::admit::Policy;
+use super::super::routes::{Access, Route, table};
+use super::people::Browser;
 use super::{Bench, HOST, TOKEN, request, write};
+use crate::people::{Right, Role};
 
 /// A path of the table with something in the place of its parameters.
 fn concrete(path: &str) -> String {
@@ -20,10 +24,13 @@ fn writes() -> Vec<(Method, String)> {
     let method = |access| match access {
         Access::Write => Some(Method::POST),
         Access::Remove => Some(Method::DELETE),
-        Access::Read | Access::Stream => None,
+        Access::Read | Access::Stream | Access::Door => None,
     };
-    let paths: Vec<_> =
-        table().iter().filter_map(|route| Some((method(route.access)?, concrete(route.path)))).collect();
+    let paths: Vec<_> = table()
+        .iter()
+        .filter(|route| route.policy != Policy::LoggedIn)
+        .filter_map(|route| Some((method(route.access)?, concrete(route.path))))
+        .collect();
     assert!(paths.len() >= 8 && paths.iter().any(|(method, _)| method == Method::DELETE));
     paths
 }
@@ -108,6 +115,158 @@ async fn every_write_is_refused_in_every_wrong_way() {
     }
     assert_eq!(bench.store.counts().await.unwrap().commands, 0);
     assert_eq!(bench.store.last_event_seq().await.unwrap(), 1);
+}
+
+fn method(route: &Route) -> Method {
+    match route.access {
+        Access::Read | Access::Stream => Method::GET,
+        Access::Write | Access::Door => Method::POST,
+        Access::Remove => Method::DELETE,
+    }
+}
+
+fn is_changing(route: &Route) -> bool {
+    matches!(route.access, Access::Write | Access::Remove)
+}
+
+/// What a browser sends on this route, with everything that belongs to it.
+fn asked(browser: &Browser, route: &Route) -> Request<Body> {
+    browser.write(method(route), &concrete(route.path), "k", &json!({}))
+}
+
+/// The whole matrix: each path × nobody, an expired session, one that was ended, one whose user was shut out, somebody
+/// without the right, a strange origin, no origin, no CSRF word, the word of another session, an exchanged cookie, a wrong
+/// method, a body too large. All are refused, each for its own reason, and nothing is stored.
+#[tokio::test]
+async fn every_path_is_refused_to_everybody_who_may_not() {
+    let bench = Bench::with_people(|settings| settings.open_reading = Some(false)).await;
+    let root = bench.somebody("root-admin", Role::Administrator).await;
+    // A machine that may do anything but the right in question is the sharpest stranger.
+    let mut lacking = std::collections::BTreeMap::new();
+    for right in Right::ALL {
+        let scopes: Vec<&str> =
+            Right::ALL.iter().filter(|other| **other != right).map(|other| other.name()).collect();
+        let body = json!({"name": format!("no-{right}"), "scopes": scopes, "days": 30});
+        let made = bench.send(root.write(Method::POST, "/api/v1/tokens", right.name(), &body)).await.ok();
+        lacking.insert(right, made["secret"].as_str().unwrap().to_owned());
+    }
+    let expired = bench.somebody("eve", Role::Administrator).await;
+    bench.hands.pass_h(13.0);
+    let ended = bench.somebody("ed", Role::Administrator).await;
+    bench.send(ended.write(Method::DELETE, "/api/v1/session", "o", &json!({}))).await.ok();
+    let shut_out = bench.somebody("otto", Role::Administrator).await;
+    let root = bench.somebody("root-admin", Role::Administrator).await;
+    let disable = root.write(Method::POST, "/api/v1/users/otto", "d", &json!({"disabled": true}));
+    bench.send(disable).await.ok();
+    let other = bench.somebody("olga", Role::Administrator).await;
+    let before = bench.store.last_event_seq().await.unwrap();
+
+    let large = json!({"x": "x".repeat(70_000)});
+    let mut tried = 0;
+    for route in table().iter().filter(|route| route.policy != Policy::Anyone) {
+        let path = concrete(route.path);
+        let mut refused = Vec::new();
+        let nobody = Browser { cookie: "x=y".to_owned(), csrf: "x".to_owned() };
+        for (name, browser) in
+            [("nobody", &nobody), ("expired", &expired), ("ended", &ended), ("shut out", &shut_out)]
+        {
+            refused.push((name, asked(browser, route), 401, "login-required"));
+        }
+        if let Policy::Needs(right) = route.policy {
+            let mut request = asked(&nobody, route);
+            let bearer = format!("Bearer {}", lacking[&right]);
+            request.headers_mut().insert("authorization", bearer.parse().unwrap());
+            refused.push(("without the right", request, 403, "forbidden"));
+        }
+        let strange = |origin: &str| {
+            let mut request = asked(&root, route);
+            request.headers_mut().insert("origin", origin.parse().unwrap());
+            request
+        };
+        for origin in ["http://evil.example", "null", "http://127.0.0.1:8701", "https://127.0.0.1:8700"] {
+            refused.push(("strange origin", strange(origin), 403, "origin-refused"));
+        }
+        if is_changing(route) {
+            let mut none = asked(&root, route);
+            none.headers_mut().remove("origin");
+            refused.push(("no origin", none, 403, "csrf"));
+            let mut no_word = asked(&root, route);
+            no_word.headers_mut().remove("x-csrf-token");
+            refused.push(("no CSRF word", no_word, 403, "csrf"));
+            let mut wrong_word = asked(&root, route);
+            wrong_word.headers_mut().insert("x-csrf-token", other.csrf.parse().unwrap());
+            refused.push(("word of another session", wrong_word, 403, "csrf"));
+            let too_large = root.write(method(route), &path, "k", &large);
+            refused.push(("too large", too_large, 413, "body-too-large"));
+        }
+        let mut wrong_method = asked(&root, route);
+        *wrong_method.method_mut() = Method::PATCH;
+        refused.push(("wrong method", wrong_method, 405, "method-not-allowed"));
+        for (name, request, status, problem) in refused {
+            let answer = bench.send(request).await;
+            assert_eq!(
+                (answer.status().as_u16(), answer.problem().as_str()),
+                (status, problem),
+                "{path}: {name}"
+            );
+            tried += 1;
+        }
+        // An exchanged cookie that somebody kept: it ends the session, so each path gets one of its own.
+        let old = bench.somebody("rosa", Role::Administrator).await;
+        bench.hands.pass_h(1.1);
+        let new = Browser::of(&bench.send(old.read("/api/v1/session")).await);
+        bench.send(new.read("/api/v1/version")).await.ok();
+        bench.hands.pass_h(0.02);
+        bench.send(root.read("/api/v1/version")).await.ok();
+        let replayed = bench.send(asked(&old, route)).await;
+        assert_eq!(replayed.problem(), "session-replayed", "{path}");
+        assert_eq!(bench.send(asked(&new, route)).await.problem(), "login-required", "{path}");
+        tried += 2;
+    }
+    assert!(tried > 500, "{tried}");
+    assert_eq!(bench.store.counts().await.unwrap().commands, 0);
+    assert_eq!(bench.store.last_event_seq().await.unwrap(), before);
+}
+
+#[test]
+fn what_anybody_may_take_is_known_by_name() {
+    let open: Vec<_> =
+        table().into_iter().filter(|route| route.policy == Policy::Anyone).map(|r| r.path).collect();
+    let known = [
+        "/",
+        "/favicon.ico",
+        "/page/{file}",
+        "/login",
+        "/welcome",
+        "/api/v1/session",
+        "/api/v1/session",
+        "/api/v1/welcome",
+        "/api/v1/health",
+    ];
+    assert_eq!(open, known, "a path without any condition: is there really nothing in it that needs one?");
+}
+
+#[tokio::test]
+async fn the_doors_take_no_strangers_page_and_no_endless_body() {
+    let bench = Bench::new().await;
+    for path in ["/api/v1/session", "/api/v1/welcome"] {
+        let knock = || {
+            request(Method::POST, path)
+                .header(header::CONTENT_TYPE, "application/json")
+                .body(Body::from("{}"))
+                .unwrap()
+        };
+        let mut strange = knock();
+        strange.headers_mut().insert("origin", "http://evil.example".parse().unwrap());
+        assert_eq!(bench.send(strange).await.problem(), "origin-refused");
+        let mut form = knock();
+        form.headers_mut().insert("content-type", "application/x-www-form-urlencoded".parse().unwrap());
+        assert_eq!(bench.send(form).await.problem(), "wrong-media-type");
+        let mut large = knock();
+        *large.body_mut() = Body::from(format!("{{\"x\":\"{}\"}}", "x".repeat(70_000)));
+        assert_eq!(bench.send(large).await.problem(), "body-too-large");
+        assert_eq!(bench.send(knock()).await.problem(), "wrong-shape");
+    }
 }
 
 #[tokio::test]

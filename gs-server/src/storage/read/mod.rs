@@ -56,16 +56,16 @@ pub struct Scope {
 }
 
 /// A list with conditions; values are bound, never written into the statement.
-struct List {
+pub(super) struct List {
     statement: QueryBuilder<Sqlite>,
 }
 
 impl List {
-    fn of<R: Row>() -> Self {
+    pub(super) fn of<R: Row>() -> Self {
         Self { statement: QueryBuilder::new(format!("{} where true", R::SELECT)) }
     }
 
-    fn equal(mut self, column: &'static str, value: Option<&str>) -> Self {
+    pub(super) fn equal(mut self, column: &'static str, value: Option<&str>) -> Self {
         if let Some(value) = value {
             self.statement.push(format_args!(" and {column} = ")).push_bind(value.to_owned());
         }
@@ -91,14 +91,14 @@ impl List {
         self
     }
 
-    fn scope(self, scope: &Scope) -> Self {
+    pub(super) fn scope(self, scope: &Scope) -> Self {
         self.equal("satellite", scope.satellite.as_deref())
             .equal("station", scope.station.as_deref())
             .equal("link", scope.link.as_deref())
     }
 
     /// The rows of the page, `id` being the column that numbers them.
-    async fn page<R: Row>(
+    pub(super) async fn page<R: Row>(
         mut self,
         store: &Store,
         id: &'static str,
