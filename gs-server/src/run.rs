@@ -277,6 +277,7 @@ pub async fn run_with(
         token,
         identity,
         demo,
+        streams_max: config.http.streams,
         stop: api.soft.clone(),
     };
     let router = http::router(state, AllowedHosts::new(address, &config.http.allowed_hosts));

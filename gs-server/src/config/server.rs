@@ -180,6 +180,8 @@ pub struct HttpSection {
     pub allowed_hosts: Vec<String>,
     /// The 0600 file with the token that every write needs. Default `token` in the data folder.
     pub token_file: Option<PathBuf>,
+    /// Streams (WebSocket) that may be open at once; more are refused. Default 2048.
+    pub streams: usize,
 }
 
 impl Default for HttpSection {
@@ -188,6 +190,7 @@ impl Default for HttpSection {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8700)),
             allowed_hosts: Vec::new(),
             token_file: None,
+            streams: 2048,
         }
     }
 }

@@ -8,10 +8,12 @@
 //!
 //! What it does **not** do: decide anything (intents go to the engine), know SQL (the store answers), read a clock.
 
+mod accept;
 mod admit;
 mod antenna;
 mod clock;
 mod commands;
+mod conditional;
 mod downloads;
 mod elements;
 mod events;
@@ -22,6 +24,7 @@ mod hosts;
 mod images;
 mod keys;
 mod links;
+pub mod openapi;
 mod page;
 mod plans;
 mod problem;
@@ -63,8 +66,8 @@ pub use antenna::RadioOnAir;
 pub use hosts::AllowedHosts;
 pub use token::{Token, TokenError};
 
-/// Streams that may be open at once; more are refused.
-const STREAMS_MAX: usize = 64;
+/// Bytes that the kernel keeps for one connection.
+const SEND_BUFFER: usize = 128 * 1024;
 
 /// Whom the handlers ask.
 #[derive(Clone)]
@@ -89,6 +92,8 @@ pub struct HttpState {
     pub identity: Identity,
     /// What a demo tells of itself; shown in the station's view.
     pub demo: Option<serde_json::Value>,
+    /// Streams that may be open at once; more are refused.
+    pub streams_max: usize,
     /// Cancelled when the server stops: open streams end.
     pub stop: CancellationToken,
 }
@@ -152,18 +157,22 @@ struct App {
     state: Arc<HttpState>,
     hosts: Arc<AllowedHosts>,
     streams: Arc<Semaphore>,
+    feed: stream::Feed,
     /// Turns of those who compute something long.
     computing: Arc<Semaphore>,
 }
 
-/// The API and the page.
+/// The API and the page. Within tokio: the feed of the streams runs from here on, until [`HttpState::stop`].
 pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
+    let (streams_max, stop) = (state.streams_max.min(Semaphore::MAX_PERMITS), state.stop.clone());
     let app = App {
         state: Arc::new(state),
         hosts: Arc::new(allowed_hosts),
-        streams: Arc::new(Semaphore::new(STREAMS_MAX)),
+        streams: Arc::new(Semaphore::new(streams_max)),
+        feed: stream::Feed::new(),
         computing: Arc::new(Semaphore::new(sky::COMPUTING_MAX)),
     };
+    tokio::spawn(app.feed.clone().run(app.clone(), stop));
     routes::table()
         .into_iter()
         .fold(Router::new(), |router, route| route.add_to(router, &app))
@@ -185,6 +194,10 @@ pub async fn serve(
     let listener = listener.tap_io(|stream| {
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "A connection keeps Nagle's algorithm.");
+        }
+        // Else the kernel would keep megabytes for each client that takes nothing.
+        if let Err(error) = rustix::net::sockopt::set_socket_send_buffer_size(&*stream, SEND_BUFFER) {
+            tracing::debug!(%error, "A connection keeps its large buffer.");
         }
     });
     axum::serve(listener, router).with_graceful_shutdown(stop.cancelled_owned()).await

@@ -11,8 +11,8 @@ use super::admit::Policy::{Anyone, Needs};
 use super::admit::{Policy, admit};
 use super::write::guard_write;
 use super::{
-    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, page, plans,
-    runs, schedule, sky, station, status, stream, telemetry,
+    App, antenna, clock, commands, downloads, elements, events, frames, images, keys, links, openapi, page,
+    plans, runs, schedule, sky, station, status, stream, telemetry,
 };
 use crate::people::Right::{Command, Look, ManageStation, Plan};
 
@@ -70,6 +70,8 @@ pub(super) fn table() -> Vec<Route> {
         read("/", Anyone, page::index),
         read("/favicon.ico", Anyone, page::favicon),
         read("/page/{file}", Anyone, page::file),
+        read("/api/docs", Anyone, openapi::docs),
+        read("/api/v1/openapi.json", Anyone, openapi::serve),
         read("/api/v1/health", Anyone, status::health),
         read("/api/v1/version", Needs(Look), status::version),
         read("/api/v1/station", Needs(Look), station::get),

@@ -1,6 +1,8 @@
 //! A real store in a temporary folder and a real engine, heard by a satellite made of bytes.
 
+mod client;
 mod elements;
+mod openapi;
 mod page;
 mod plans;
 mod reads;
@@ -114,6 +116,7 @@ impl Bench {
             token: Token::new(TOKEN).unwrap(),
             identity,
             demo: Some(json!({"speed": 1.0})),
+            streams_max: 64,
             stop: stop.clone(),
         };
         let router = router(state, AllowedHosts::new(address, &[HOST.to_owned()]));

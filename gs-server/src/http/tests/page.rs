@@ -12,6 +12,9 @@ async fn every_file_that_the_page_names_is_served_with_its_type() {
     let index = bench.get("/").await;
     assert_eq!(index.header("content-type"), "text/html; charset=utf-8");
     let mut texts = vec![String::from_utf8(index.bytes).unwrap()];
+    let docs = bench.get("/api/docs").await;
+    assert_eq!(docs.header("content-type"), "text/html; charset=utf-8");
+    texts.push(String::from_utf8(docs.bytes).unwrap());
     texts.extend(FILES.iter().map(|(_, text)| (*text).to_owned()));
     for (name, _) in FILES {
         let file = bench.get(&format!("/page/{name}")).await;
@@ -39,6 +42,9 @@ fn data_reaches_the_page_as_text_only_and_nothing_is_fetched_from_elsewhere() {
     let index = include_str!("../page/index.html");
     assert!(!index.contains("<style") && !index.contains(" style=") && !index.contains(" onclick"));
     assert!(index.matches("<script").count() == 1 && index.contains("src=\"/page/main.js\""));
+    let docs = include_str!("../page/docs.html");
+    assert!(!docs.contains("<style") && !docs.contains(" style=") && !docs.contains(" onclick"));
+    assert!(docs.matches("<script").count() == 1 && docs.contains("src=\"/page/docs.js\""));
     for (name, text) in FILES {
         for forbidden in [
             "innerHTML",
