@@ -12,6 +12,18 @@ pub fn now() -> Instant {
     Instant::now()
 }
 
+/// The machine's clock in UTC, microseconds since 1970.
+///
+/// # Panics
+/// When the machine believes that it is before 1970.
+#[must_use]
+#[expect(clippy::disallowed_methods, reason = "real processes are watched from outside, in real time")]
+pub fn utc_us() -> i64 {
+    let since =
+        std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a clock that is set");
+    i64::try_from(since.as_micros()).expect("a time of these ages")
+}
+
 /// Stands still for this long.
 #[expect(clippy::disallowed_methods, reason = "real processes are watched from outside, in real time")]
 pub fn pause(duration: Duration) {

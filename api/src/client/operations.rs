@@ -64,7 +64,7 @@ macro_rules! ones {
             /// # Errors
             /// [`ClientError`].
             pub async fn $name(&self, id: u64) -> Result<$answer, ClientError> {
-                self.get(&format!($path), &Filter::new()).await
+                self.get(&$path.replacen('*', &id.to_string(), 1), &Filter::new()).await
             })*
         }
     };
@@ -80,7 +80,7 @@ macro_rules! verbs {
             /// [`ClientError`].
             pub async fn $name(&self, of: $of, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
                 let of = segment(&of.to_string());
-                self.post(&format!($path), &Nothing {}, key).await
+                self.post(&$path.replacen('*', &of, 1), &Nothing {}, key).await
             })*
         }
     };
@@ -136,38 +136,38 @@ lists! {
 
 ones! {
     /// One frame, decoded field by field.
-    frame -> FrameView = "frames/{id}";
+    frame -> FrameView = "frames/*";
     /// One command with all its stages.
-    command -> CommandView = "commands/{id}";
+    command -> CommandView = "commands/*";
     /// One download.
-    download -> DownloadView = "downloads/{id}";
+    download -> DownloadView = "downloads/*";
     /// One image.
-    image -> ImageView = "images/{id}";
+    image -> ImageView = "images/*";
     /// Which chunks of an image are held.
-    image_chunks -> ChunkMap = "images/{id}/chunks";
+    image_chunks -> ChunkMap = "images/*/chunks";
     /// The report of one run.
-    run -> RunReport = "runs/{id}";
+    run -> RunReport = "runs/*";
 }
 
 verbs! {
     /// Withdraws a command that was not radiated.
-    cancel_command(u64) = "commands/{of}/cancel";
+    cancel_command(u64) = "commands/*/cancel";
     /// Asks for no more of an image.
-    cancel_download(u64) = "downloads/{of}/cancel";
+    cancel_download(u64) = "downloads/*/cancel";
     /// The link may transmit.
-    arm_link(&str) = "links/{of}/arm";
+    arm_link(&str) = "links/*/arm";
     /// The link must not transmit any more.
-    disarm_link(&str) = "links/{of}/disarm";
+    disarm_link(&str) = "links/*/disarm";
     /// The plan may run.
-    arm_plan(&str) = "plans/{of}/arm";
+    arm_plan(&str) = "plans/*/arm";
     /// The plan must not run any more.
-    disarm_plan(&str) = "plans/{of}/disarm";
+    disarm_plan(&str) = "plans/*/disarm";
     /// Takes a satellite over from the plan that runs.
-    hold(&str) = "satellites/{of}/hold";
+    hold(&str) = "satellites/*/hold";
     /// Gives it back.
-    release(&str) = "satellites/{of}/release";
+    release(&str) = "satellites/*/release";
     /// I know why counter and witness of this key disagree.
-    confirm_counter(&str) = "keys/{of}/confirm-counter";
+    confirm_counter(&str) = "keys/*/confirm-counter";
 }
 
 impl Client {

@@ -35,6 +35,8 @@ use wanted::Wanted;
 
 /// Bytes that a client's message may have.
 const MESSAGE_MAX: usize = 4 * 1024;
+/// Bytes of a message that are taken, so that its sender can be told that it is too long.
+const MESSAGE_READ: usize = 64 * 1024;
 /// Messages of a client between two pings; pings and pongs of its own count, too.
 const SAID_MAX: u32 = 60;
 /// Bytes that are gathered before they are written.
@@ -75,8 +77,8 @@ pub(super) async fn open(
         Failure::new(ProblemKind::TooManyStreams, format!("{most} streams are open already (http.streams)."))
     })?;
     let upgrade = upgrade
-        .max_message_size(MESSAGE_MAX)
-        .max_frame_size(MESSAGE_MAX)
+        .max_message_size(MESSAGE_READ)
+        .max_frame_size(MESSAGE_READ)
         .read_buffer_size(READ_BUFFER)
         .write_buffer_size(WRITE_BUFFER)
         .max_write_buffer_size(WRITE_BUFFER_MAX);
@@ -254,13 +256,12 @@ impl Follower {
                 self.unanswered = 0;
                 ControlFlow::Continue(())
             }
+            Some(Ok(Message::Text(text))) if text.len() > MESSAGE_MAX => ControlFlow::Break(End::TooLong),
             Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
                 Ok(request) => self.change(request).await,
                 Err(_) => ControlFlow::Break(End::Nonsense),
             },
             Some(Ok(Message::Binary(_))) => ControlFlow::Break(End::Nonsense),
-            // axum does not tell kinds of errors, but it does tell the protocol's own words.
-            Some(Err(error)) if error.to_string().contains("too long") => ControlFlow::Break(End::TooLong),
             Some(Ok(Message::Close(_)) | Err(_)) | None => ControlFlow::Break(End::Gone),
         }
     }
@@ -315,8 +316,14 @@ impl Follower {
         let mut reason = reason.into_owned();
         reason.truncate(reason.floor_char_boundary(120));
         let frame = CloseFrame { code, reason: Utf8Bytes::from(reason) };
+        let word = async {
+            self.socket.send(Message::Close(Some(frame))).await?;
+            // What the client still says is taken: a line that is closed over it would lose our word.
+            while let Some(Ok(_)) = self.socket.recv().await {}
+            Ok::<_, axum::Error>(())
+        };
         // Who takes nothing does not take this either.
-        let _ = within(Duration::from_secs(1), self.socket.send(Message::Close(Some(frame)))).await;
+        let _ = within(Duration::from_secs(1), word).await;
     }
 }
 
