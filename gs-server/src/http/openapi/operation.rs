@@ -1,13 +1,13 @@
 //! One row of the table of operations, and how it becomes an operation of the document.
 
-use api::{Problem, ProblemKind};
-use utoipa::ToSchema;
+use api::{Page, Problem, ProblemKind};
 use utoipa::openapi::path::{HttpMethod, Operation, OperationBuilder, ParameterBuilder, ParameterIn};
 use utoipa::openapi::request_body::RequestBodyBuilder;
 use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{KnownFormat, ObjectBuilder, Schema, SchemaFormat, Type};
 use utoipa::openapi::security::SecurityRequirement;
 use utoipa::openapi::{ContentBuilder, HeaderBuilder, Ref, RefOr, Required};
+use utoipa::{PartialSchema as _, ToSchema};
 
 /// Schemas by name, as they come together.
 pub(super) type Schemas = Vec<(String, RefOr<Schema>)>;
@@ -57,6 +57,8 @@ pub(in crate::http) struct Doc {
     more: &'static str,
     pub(in crate::http) params: Vec<Param>,
     body: Option<String>,
+    /// No body is the same as `{}`.
+    body_may_be_empty: bool,
     answer: Answer,
     status: u16,
     also: Vec<(u16, &'static str)>,
@@ -75,6 +77,7 @@ fn doc(method: &'static str, path: &'static str, tag: &'static str, id: &'static
         more: "",
         params: Vec::new(),
         body: None,
+        body_may_be_empty: false,
         answer: Answer::Upgrade,
         status: 200,
         also: Vec::new(),
@@ -115,14 +118,23 @@ impl Doc {
         Self { answer: Answer::Json { name }, ..self }
     }
 
+    /// The answer is a page of these. Each list has its own name in the document.
+    pub(super) fn page<T: ToSchema>(mut self) -> Self {
+        self.schema::<T>();
+        let name = format!("{}Page", T::name());
+        self.schemas.push((name.clone(), Page::<T>::schema()));
+        Self { answer: Answer::Json { name }, ..self }
+    }
+
     /// The answer is something else.
     pub(super) fn media(self, media_type: &'static str) -> Self {
         Self { answer: Answer::Other { media_type }, ..self }
     }
 
     /// The body of the request.
-    pub(super) fn body<T: ToSchema>(mut self) -> Self {
+    pub(super) fn body<T: ToSchema + serde::de::DeserializeOwned>(mut self) -> Self {
         self.body = Some(self.schema::<T>());
+        self.body_may_be_empty = serde_json::from_str::<T>("{}").is_ok();
         self
     }
 
@@ -262,7 +274,7 @@ impl Doc {
             operation = operation.request_body(Some(
                 RequestBodyBuilder::new()
                     .content("application/json", content.build())
-                    .required(Some(if name == "Nothing" { Required::False } else { Required::True }))
+                    .required(Some(if self.body_may_be_empty { Required::False } else { Required::True }))
                     .build(),
             ));
         }

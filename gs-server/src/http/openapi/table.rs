@@ -5,8 +5,8 @@ use api::ProblemKind as K;
 use api::{
     AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, DownloadRequest,
     DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView, Health,
-    HeldElements, ImageView, LatestValue, LimitView, LookList, Nothing, Outcome, Page, ParameterView,
-    PassKept, PassList, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, StreamMessage,
+    HeldElements, ImageView, LatestValue, LimitView, LookList, Nothing, Outcome, ParameterView, PassKept,
+    PassList, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, StreamMessage,
     StreamRequest, TelemetryPage, Version,
 };
 
@@ -95,7 +95,7 @@ fn archive() -> Vec<Doc> {
         get("/api/v1/frames", "archive", "list_frames", "Raw frames, with who heard them")
             .query(&LIST)
             .query(&[param("packet_type", Kind::Whole(0, 255), "Only packets of this type.")])
-            .json::<Page<FrameView>>(),
+            .page::<FrameView>(),
         get("/api/v1/frames/{id}", "archive", "get_frame", "One frame, decoded field by field")
             .json::<FrameView>()
             .problems(&[K::NotFound]),
@@ -111,14 +111,14 @@ fn archive() -> Vec<Doc> {
             .problems(&[K::NotFound, K::UnknownSatellite]),
         get("/api/v1/telemetry/latest", "archive", "latest", "The newest value of each parameter")
             .query(&[THE_SATELLITE])
-            .json::<Page<LatestValue>>()
+            .page::<LatestValue>()
             .tagged()
             .problems(&[K::UnknownSatellite]),
         get("/api/v1/parameters", "archive", "list_parameters", "Which values there are")
-            .json::<Page<ParameterView>>(),
+            .page::<ParameterView>(),
         get("/api/v1/images", "archive", "list_images", "Images that were declared")
             .query(&LIST)
-            .json::<Page<ImageView>>(),
+            .page::<ImageView>(),
         get("/api/v1/images/{id}", "archive", "get_image", "One image")
             .json::<ImageView>()
             .problems(&[K::NotFound]),
@@ -143,12 +143,12 @@ fn archive() -> Vec<Doc> {
                     "At least this level.",
                 ),
             ])
-            .json::<Page<EventView>>(),
+            .page::<EventView>(),
         get("/api/v1/limits", "archive", "list_limits", "Values that have been judged by their limits")
-            .json::<Page<LimitView>>(),
+            .page::<LimitView>(),
         get("/api/v1/audit", "archive", "list_audit", "Who did what, when")
             .query(&[AFTER, BEFORE, LIMIT])
-            .json::<Page<AuditView>>(),
+            .page::<AuditView>(),
         get("/api/v1/stream", "archive", "stream", "Events, values, status as they come, over a WebSocket")
             .more(
                 "A WebSocket. The server sends `StreamMessage`, the client may send `StreamRequest`; docs/api.md tells \
@@ -189,7 +189,7 @@ fn uplink() -> Vec<Doc> {
                     "Only those at this stage.",
                 ),
             ])
-            .json::<Page<CommandView>>(),
+            .page::<CommandView>(),
         post("/api/v1/commands", "uplink", "create_command", "Have a telecommand sent")
             .body::<CommandRequest>()
             .json::<Outcome>()
@@ -220,7 +220,7 @@ fn uplink() -> Vec<Doc> {
             .problems(&[K::UnknownCommand, K::TooLate]),
         get("/api/v1/downloads", "uplink", "list_downloads", "Standing orders for images")
             .query(&LIST)
-            .json::<Page<DownloadView>>(),
+            .page::<DownloadView>(),
         post(
             "/api/v1/downloads",
             "uplink",
@@ -247,7 +247,7 @@ fn sky() -> Vec<Doc> {
     vec![
         get("/api/v1/elements", "sky", "list_elements", "Elements held: age, source, which are in use")
             .query(&LIST)
-            .json::<Page<HeldElements>>()
+            .page::<HeldElements>()
             .tagged(),
         post("/api/v1/elements", "sky", "add_elements", "Add elements of one satellite, in any form")
             .body::<ElementsRequest>()
@@ -260,7 +260,7 @@ fn sky() -> Vec<Doc> {
             "list_sources",
             "Where elements are fetched from, and how it stands",
         )
-        .json::<Page<ElementsSource>>(),
+        .page::<ElementsSource>(),
         post("/api/v1/elements/fetch", "sky", "fetch_elements", "Ask the sources, as far as they allow")
             .body::<Nothing>()
             .json::<FetchReport>()
@@ -276,7 +276,7 @@ fn sky() -> Vec<Doc> {
             "Passes that began, with the elements they used",
         )
         .query(&LIST)
-        .json::<Page<PassKept>>(),
+        .page::<PassKept>(),
         get("/api/v1/passes/sky.svg", "sky", "sky_plot", "Sky plot of the pass that lasts or comes next")
             .query(&[
                 THE_SATELLITE,
@@ -323,7 +323,7 @@ fn plans() -> Vec<Doc> {
             .problems(&PLANS)
     };
     vec![
-        get("/api/v1/plans", "plans", "list_plans", "The plans in use").json::<Page<PlanView>>(),
+        get("/api/v1/plans", "plans", "list_plans", "The plans in use").page::<PlanView>(),
         post("/api/v1/plans", "plans", "add_plan", "Hand a plan over; it is not armed")
             .body::<PlanText>()
             .json::<Outcome>()
@@ -359,7 +359,7 @@ fn plans() -> Vec<Doc> {
         .json::<ScheduleView>(),
         get("/api/v1/runs", "plans", "list_runs", "What became of plans in passes")
             .query(&LIST)
-            .json::<Page<RunView>>(),
+            .page::<RunView>(),
         get("/api/v1/runs/{id}", "plans", "get_run", "The report of one run")
             .json::<RunReport>()
             .problems(&[K::NotFound]),
