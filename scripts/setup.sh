@@ -15,6 +15,7 @@ CRYPTOGRAPHY_VERSION=46
 SGP4_VERSION=2.27
 SKYFIELD_VERSION=1.55
 ERFA_VERSION=2.0
+SCHEMATHESIS_VERSION=4.32
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
@@ -54,11 +55,12 @@ int main(void) { return 0; }'
   printf '%s\n' "$c_program" | cc -x c - -o /dev/null 2>/dev/null || install_packages build-essential # gcc, libc6-dev
 }
 
-# scripts/vectors.py and scripts/orbit_vectors.py make the test vectors with other people's libraries, in .venv.
+# scripts/vectors.py and scripts/orbit_vectors.py make the test vectors with other people's libraries, and
+# scripts/fuzz-api asks a server what schemathesis thinks of; all in .venv.
 python() {
-  local packages=("cryptography>=$CRYPTOGRAPHY_VERSION" "sgp4>=$SGP4_VERSION" "skyfield>=$SKYFIELD_VERSION" "pyerfa>=$ERFA_VERSION")
+  local packages=("cryptography>=$CRYPTOGRAPHY_VERSION" "sgp4>=$SGP4_VERSION" "skyfield>=$SKYFIELD_VERSION" "pyerfa>=$ERFA_VERSION" "schemathesis>=$SCHEMATHESIS_VERSION,<5")
   python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages python3 python3-venv
-  if ! .venv/bin/python -c 'import cryptography, sgp4, skyfield, erfa' 2>/dev/null; then
+  if ! .venv/bin/python -c 'import cryptography, sgp4, skyfield, erfa, schemathesis' 2>/dev/null; then
     say "making .venv with ${packages[*]}"
     python3 -m venv --clear .venv || fail "python3 could not make .venv"
     .venv/bin/python -m pip install --quiet --disable-pip-version-check "${packages[@]}" \

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Time;
 
 /// The antenna now.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AntennaView {
     /// The rotator; `null` when there is none.
@@ -16,6 +17,7 @@ pub struct AntennaView {
 }
 
 /// A position of the rotator's two axes.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AxesView {
     /// As the rotator's dial has it: below 0 and above 360 in an overlap.
@@ -25,6 +27,7 @@ pub struct AxesView {
 }
 
 /// A rotator now.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RotatorView {
     /// Host and port of its daemon.
@@ -61,6 +64,7 @@ pub struct RotatorView {
 }
 
 /// The way through a pass.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RotatorPass {
     /// Satellite.
@@ -80,6 +84,7 @@ pub struct RotatorPass {
 }
 
 /// A rig now.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigView {
     /// Host and port of its daemon.
@@ -107,6 +112,7 @@ pub struct RigView {
 }
 
 /// How much of what a LoRa receiver bears one pass uses up, for a radio that is not tuned within it.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DopplerView {
     /// Link.

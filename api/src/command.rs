@@ -7,6 +7,7 @@ use crate::ConditionText;
 use crate::Time;
 
 /// A telecommand that somebody wants sent.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CommandRequest {
@@ -20,6 +21,7 @@ pub struct CommandRequest {
     pub command: String,
     /// Its arguments by name.
     #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub arguments: Map<String, Value>,
     /// Higher goes first; 0 is usual.
     #[serde(default)]
@@ -42,6 +44,7 @@ pub struct CommandRequest {
 }
 
 /// What must hold before a command is radiated.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum GateWord {
@@ -53,6 +56,7 @@ pub enum GateWord {
 }
 
 /// What became of a write. The same under the same idempotency key, for ever.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Outcome {
     /// What happened.
@@ -67,6 +71,7 @@ pub struct Outcome {
 }
 
 /// What happened.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutcomeWord {
@@ -85,6 +90,7 @@ pub enum OutcomeWord {
 }
 
 /// A telecommand on its way.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CommandView {
     /// Command.
@@ -104,6 +110,7 @@ pub struct CommandView {
     /// Name of the telecommand.
     pub command: String,
     /// Its arguments by name.
+    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub arguments: Map<String, Value>,
     /// Higher goes first.
     pub priority: i16,
@@ -128,6 +135,7 @@ pub struct CommandView {
 }
 
 /// A step in the life of a telecommand.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageView {
     /// Satellite.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Time;
 
 /// Bring the satellite's image home.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DownloadRequest {
@@ -17,6 +18,7 @@ pub struct DownloadRequest {
 }
 
 /// A standing order.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DownloadView {
     /// Download.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{ElementsView, RefusedElements, Time};
 
 /// Elements for one satellite. The text may hold other objects, too: those of the satellite are taken.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ElementsRequest {
@@ -22,6 +23,7 @@ pub struct ElementsRequest {
 }
 
 /// What became of elements for one satellite.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ElementsAdded {
     /// Whose.
@@ -41,6 +43,7 @@ pub struct ElementsAdded {
 }
 
 /// Elements that the archive holds.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeldElements {
     /// Number in the archive; passes name it.
@@ -68,6 +71,7 @@ pub struct HeldElements {
 }
 
 /// How it stands with one source.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SourceWord {
@@ -82,6 +86,7 @@ pub enum SourceWord {
 }
 
 /// One source of elements.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ElementsSource {
     /// Its address.
@@ -99,6 +104,7 @@ pub struct ElementsSource {
 }
 
 /// What became of one source when it was to be asked.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FetchWord {
@@ -115,6 +121,7 @@ pub enum FetchWord {
 }
 
 /// What became of one source.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFetched {
     /// Its address.
@@ -130,6 +137,7 @@ pub struct SourceFetched {
 }
 
 /// What became of all sources.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FetchReport {
     /// One by one, in the order of the configuration.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Time;
 
 /// An event of the one durable sequence.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EventView {
     /// Its place: rising, never used twice. Lists and the stream resume from it.
@@ -36,6 +37,7 @@ pub struct EventView {
 }
 
 /// Who did what: one line of the audit, which is never changed or shortened.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AuditView {
     /// Its place, rising.
@@ -53,6 +55,7 @@ pub struct AuditView {
 }
 
 /// A limit that has been judged.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LimitView {
     /// Satellite.

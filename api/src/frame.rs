@@ -10,6 +10,7 @@ use crate::Time;
 const SAFE_INTEGER: u64 = (1 << 53) - 1;
 
 /// A raw frame of the archive.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameView {
     /// Frame.
@@ -47,6 +48,7 @@ pub struct FrameView {
 }
 
 /// One station heard one frame.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReceptionView {
     /// Satellite.
@@ -64,6 +66,7 @@ pub struct ReceptionView {
 }
 
 /// A packet as names and values.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PacketView {
     /// Name of the packet, e.g. `Heartbeat`.
@@ -73,6 +76,7 @@ pub struct PacketView {
 }
 
 /// One value of a packet.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FieldView {
     /// Name, e.g. `r_teme.x`.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Time;
 
 /// An image that the satellite declared.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageView {
     /// Image.
@@ -40,6 +41,7 @@ pub struct ImageView {
 }
 
 /// Which chunks of an image are held, and who brought them.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChunkMap {
     /// Image.

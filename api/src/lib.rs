@@ -15,22 +15,29 @@
 //! | [`PlanText`], [`PlanView`], [`ScheduleView`], [`RunReport`] | plans, which pass gets which, and what came of it |
 //! | [`SessionView`], [`UserView`], [`TokenView`] | who may come in |
 //! | [`ApprovalView`], [`TransmissionView`] | what a second person has to approve; who answered for a radiation |
-//! | [`StreamMessage`] | what the WebSocket says |
+//! | [`StreamMessage`], [`StreamRequest`] | what the WebSocket says, and what may be said to it |
 //! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
 //!
 //! Rules of the wire: unknown is `null`, never 0; units stand in the names; requests refuse fields they do not know,
 //! answers may grow fields, so a client ignores those it does not know.
 //!
-//! What this crate does **not** do: it has no HTTP, no clock and no SQL, and it knows `protocol` only. The server
+//! The feature `client` brings a typed client with a stream that comes back by itself (`api::client`), the feature `openapi`
+//! schemas of the types.
+//!
+//! What this crate does **not** do: without these features it has no HTTP, no clock and no SQL, and it knows `protocol` only. The server
 //! converts its own types into these.
 
 mod antenna;
+#[cfg(feature = "client")]
+pub mod client;
 mod command;
 mod download;
 mod elements;
 mod event;
 mod frame;
 mod image;
+#[cfg(feature = "openapi")]
+mod openapi;
 mod page;
 mod people;
 mod plan;
@@ -80,7 +87,7 @@ pub use sky::{
 pub use station::{
     ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView,
 };
-pub use stream::StreamMessage;
+pub use stream::{StreamMessage, StreamRequest, StreamValue, Topic, UnknownTopic};
 pub use telecommand::ArgumentError;
 pub use telemetry::{Bucket, LatestValue, ParameterView, Sample, TelemetryPage};
 pub use time::{Time, TimeError};
@@ -90,5 +97,14 @@ pub use version::{Health, Version};
 pub const API_VERSION: u32 = 1;
 
 /// What this version can do; a client asks for a capability by name, never by version number.
-pub const CAPABILITIES: [&str; 8] =
-    ["archive", "commands", "downloads", "images", "idempotency", "limits", "plans", "stream-resume"];
+pub const CAPABILITIES: [&str; 9] = [
+    "archive",
+    "commands",
+    "downloads",
+    "images",
+    "idempotency",
+    "limits",
+    "plans",
+    "stream-resume",
+    "stream-topics",
+];

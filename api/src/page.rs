@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// Without `after` a list runs from the newest down, and the next page is asked for with `before=NEXT`; with `after`
 /// it runs upwards, and the next page is asked for with `after=NEXT`.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Page<T> {
     /// The entries.
@@ -15,6 +16,7 @@ pub struct Page<T> {
 }
 
 /// The body of a request that needs none: empty, or `{}`.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Nothing {}

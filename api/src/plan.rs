@@ -9,6 +9,7 @@ use serde_json::{Map, Value};
 use crate::{GateWord, Time};
 
 /// What to do with one satellite in one pass.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanText {
@@ -46,6 +47,7 @@ const fn one() -> f64 {
 }
 
 /// The least pass that a plan takes.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MinPassText {
@@ -58,6 +60,7 @@ pub struct MinPassText {
 }
 
 /// What becomes of what is undone at LOS.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AtLosWord {
@@ -69,6 +72,7 @@ pub enum AtLosWord {
 }
 
 /// Every pass of the satellite that matches.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AttachText {
@@ -91,6 +95,7 @@ const fn every_one() -> u32 {
 }
 
 /// One step. Which fields belong to it depends on `do`.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepText {
@@ -115,6 +120,7 @@ pub struct StepText {
     /// `command`: its arguments by name, as in [`CommandRequest`](crate::CommandRequest); for SetTimestamp also
     /// `utc = "now"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
     pub arguments: Option<Map<String, Value>>,
     /// `command`, `upload-schedule`: higher goes first; the plan's when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -145,6 +151,7 @@ pub struct StepText {
     pub schedule: Option<u8>,
     /// `repeat-until`: the steps of each round.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(no_recursion))]
     pub steps: Option<Vec<StepText>>,
     /// `repeat-until`: so many rounds at most.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -152,6 +159,7 @@ pub struct StepText {
 }
 
 /// What follows when a step fails.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnFailureWord {
@@ -165,6 +173,7 @@ pub enum OnFailureWord {
 }
 
 /// All of what is given must hold.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConditionText {
@@ -186,6 +195,7 @@ pub struct ConditionText {
 }
 
 /// A value of the satellite compared with a number.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GuardText {
@@ -200,6 +210,7 @@ pub struct GuardText {
 }
 
 /// Somebody allows a critical command beforehand.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ApprovalText {
@@ -214,6 +225,7 @@ pub struct ApprovalText {
 }
 
 /// What is wrong with a plan.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlanFinding {
     /// `error` or `warning`; with an error the plan is not taken.

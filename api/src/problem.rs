@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The body of every answer that is an error; media type `application/problem+json`.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Problem {
     /// What kind, a stable URN: [`ProblemKind::urn`].
@@ -26,6 +27,7 @@ pub struct Problem {
 }
 
 /// One field that is wrong.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FieldError {
     /// Which, e.g. `arguments.count`.
@@ -101,6 +103,8 @@ kinds! {
     NotFound 404 "not-found" "There is nothing here";
     /// The path does not take this method.
     MethodNotAllowed 405 "method-not-allowed" "This path does not take this method";
+    /// What the path has to say comes in none of the forms that are accepted.
+    NotAcceptable 406 "not-acceptable" "This path answers in another form";
     /// A parameter of the query or of the path is wrong.
     BadParameter 400 "bad-parameter" "A parameter is wrong";
     /// The body is no JSON.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{CommandView, DownloadView, PlanText, Time};
 
 /// A plan in use.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanView {
     /// Its number in the archive; another text under the same name is another plan.
@@ -28,6 +29,7 @@ pub struct PlanView {
 }
 
 /// A pass is chosen for a plan, or the choice taken back.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AttachRequest {
@@ -36,6 +38,7 @@ pub struct AttachRequest {
 }
 
 /// What the antenna does in the coming two days, and why.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScheduleView {
     /// Whose.
@@ -81,6 +84,7 @@ pub struct OpenView {
 }
 
 /// A pass that was chosen.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ContactView {
     /// Whose pass.
@@ -118,6 +122,7 @@ pub struct ContactView {
 }
 
 /// A pass that a plan wants and does not get.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RefusedView {
     /// Whose pass.
@@ -139,6 +144,7 @@ pub struct RefusedView {
 }
 
 /// A contact that stands in the way of another pass.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RivalView {
     /// Whose pass.
@@ -156,6 +162,7 @@ pub struct RivalView {
 }
 
 /// An armed plan in one pass.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunView {
     /// Its number.
@@ -194,6 +201,7 @@ pub struct RunView {
 }
 
 /// What was planned for a pass and what happened.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
     /// The run.
@@ -215,6 +223,7 @@ pub struct RunReport {
 }
 
 /// A step that ended.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Which, e.g. `steps[3].steps[0]`.

@@ -53,7 +53,21 @@ impl<'de> Deserialize<'de> for FineTime {
     }
 }
 
+#[cfg(feature = "openapi")]
+impl utoipa::PartialSchema for FineTime {
+    fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::Schema> {
+        crate::openapi::time(
+            "An instant in UTC with microseconds; read from any offset and precision.",
+            "2026-11-22T05:19:25.123456Z",
+        )
+    }
+}
+
+#[cfg(feature = "openapi")]
+impl utoipa::ToSchema for FineTime {}
+
 /// Why a pass begins or ends where it does.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PassEndWord {
@@ -67,6 +81,7 @@ pub enum PassEndWord {
 
 /// A satellite above a station, from AOS to LOS. Angles are geometric, without refraction. A Doppler shift is that of the
 /// downlink, positive while the satellite approaches, and `null` when no frequency was given.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PassView {
     /// Name of the satellite; without one its catalogue number or designator.
@@ -148,6 +163,7 @@ pub struct PassView {
 }
 
 /// A part of the window in which the elements have no state: nothing is known of passes there.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SkyGapView {
     /// Satellite.
@@ -165,6 +181,7 @@ pub struct SkyGapView {
 }
 
 /// The passes of a window of time, computed when they were asked for. Same words as `gs-server passes --json`.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PassList {
     /// Station.
@@ -188,6 +205,7 @@ pub struct PassList {
 }
 
 /// Where satellites stand at instants, computed when it was asked for. Same words as `gs-server look --json`.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LookList {
     /// The frequency of the Doppler shifts; `null` when none was given.
@@ -201,6 +219,7 @@ pub struct LookList {
 }
 
 /// A pass that began, as it is kept, with the elements it used.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PassKept {
     /// Its number in the archive.
@@ -224,6 +243,7 @@ pub struct PassKept {
 }
 
 /// Elements that a pass used.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ElementsUsed {
     /// Their number in the archive; `/elements` tells them.
@@ -236,6 +256,7 @@ pub struct ElementsUsed {
 
 /// Where a satellite stands at an instant, seen from a station. Where the elements have no state, `error` says why and
 /// every value is `null`.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LookView {
     /// Name of the satellite.
@@ -285,6 +306,7 @@ pub struct LookView {
 }
 
 /// A set of elements of a list or file that could not be used.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RefusedElements {
     /// The file or address it stands in.
@@ -298,6 +320,7 @@ pub struct RefusedElements {
 }
 
 /// A set of mean elements, as a published OMM or TLE has them.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ElementsView {
     /// Name of the object.

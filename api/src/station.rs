@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{AntennaView, Time};
 
 /// The station now. A view, not a record: it is not kept.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StationView {
     /// Station.
@@ -31,6 +32,7 @@ pub struct StationView {
 }
 
 /// One satellite now.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SatelliteView {
     /// Satellite.
@@ -71,6 +73,7 @@ pub struct SatelliteView {
 }
 
 /// The elements that say where a satellite is.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ElementsInUse {
     /// Their number in the archive.
@@ -88,6 +91,7 @@ pub struct ElementsInUse {
 }
 
 /// A pass in short; `/passes` tells more.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextPass {
     /// Acquisition of signal.
@@ -105,6 +109,7 @@ pub struct NextPass {
 }
 
 /// How far an image is.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageProgress {
     /// Image.
@@ -118,6 +123,7 @@ pub struct ImageProgress {
 }
 
 /// One link now.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinkView {
     /// Link.
@@ -147,6 +153,7 @@ pub struct LinkView {
 }
 
 /// Sealing with one key.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SealingView {
     /// Key id.
@@ -158,6 +165,7 @@ pub struct SealingView {
 }
 
 /// Storage now.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct StorageView {
     /// Why nothing is stored; `null` when all is well.

@@ -8,6 +8,7 @@ use crate::Time;
 ///
 /// Few values come as they are in `samples`; many are thinned into `buckets` of equal length that keep minimum and
 /// maximum, so that no spike is lost. One of the two is empty.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TelemetryPage {
     /// Parameter, e.g. `heartbeat.temp`.
@@ -29,6 +30,7 @@ pub struct TelemetryPage {
 }
 
 /// One value.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// When it was heard.
@@ -40,6 +42,7 @@ pub struct Sample {
 }
 
 /// Many values.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Bucket {
     /// Begin of the bucket.
@@ -61,6 +64,7 @@ pub struct Bucket {
 }
 
 /// The newest value of a parameter.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LatestValue {
     /// Parameter.
@@ -82,6 +86,7 @@ pub struct LatestValue {
 }
 
 /// A parameter of which there are values.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ParameterView {
     /// Parameter.

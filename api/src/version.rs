@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Time;
 
 /// Who is there and what it can.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Version {
     /// Name of the server, `gs-server`.
@@ -24,6 +25,7 @@ pub struct Version {
 }
 
 /// Whether the server lives, and whether it can do its work.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Health {
     /// The process answers; always true in an answer.

@@ -218,6 +218,7 @@ pub async fn run_with(
     let looks_after_itself = timer.is_none();
     config.check()?;
     no_core_dumps();
+    open_files_for_all();
     tracing::info!("configuration:\n{config}");
     let keys = load_keys(&config)?;
     let station = station_config(&config, &keys)?;
@@ -309,6 +310,7 @@ pub async fn run_with(
         people: people.clone(),
         identity,
         demo,
+        streams_max: config.http.streams,
         stop: api.soft.clone(),
     };
     let router = http::router(state, AllowedHosts::new(address, &config.http.allowed_hosts));
@@ -388,6 +390,15 @@ fn no_core_dumps() {
     let none = Rlimit { current: Some(0), maximum: Some(0) };
     if let Err(error) = setrlimit(Resource::Core, none) {
         tracing::warn!(%error, "core dumps cannot be switched off: {error}");
+    }
+}
+
+/// Each stream takes an open file, and many systems begin with 1024: as many as the system allows.
+fn open_files_for_all() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let Rlimit { maximum, .. } = getrlimit(Resource::Nofile);
+    if let Err(error) = setrlimit(Resource::Nofile, Rlimit { current: maximum, maximum }) {
+        tracing::warn!(%error, "the number of open files cannot be raised: {error}");
     }
 }
 

@@ -9,6 +9,7 @@
 //! | [`http`] | a client of API v1 that believes only whole answers |
 //! | [`pty`] | a pseudo-terminal, for tests that play the radio themselves |
 //! | [`stream`] | a follower of the WebSocket |
+//! | [`crowd`] | a thousand clients of the stream, some of them stalled or hostile, and what it costs |
 //! | [`journal`] | what the twin wrote down: the far end's own witness |
 //! | [`strace`] | system calls, as strace tells them |
 //! | [`watch`], [`operator`] | somebody who remembers what the server published; somebody who commands |
@@ -19,6 +20,7 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot be set up has failed, loudly")]
 
 pub mod binary;
+pub mod crowd;
 pub mod folder;
 pub mod http;
 pub mod journal;

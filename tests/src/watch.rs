@@ -103,6 +103,8 @@ impl Watcher {
                 self.change(|p| p.event(event));
             }
             StreamMessage::Status(_) | StreamMessage::Live { .. } => self.frames(client),
+            // Topics that it did not ask for.
+            _ => {}
         }
     }
 

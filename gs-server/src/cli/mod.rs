@@ -15,6 +15,7 @@ mod failure;
 mod hold;
 mod key;
 mod look;
+mod openapi;
 mod passes;
 mod plan;
 mod plans;
@@ -87,6 +88,8 @@ pub enum Command {
     Passes(passes::Passes),
     /// Where satellites stand at instants, from a file of elements
     Look(look::Look),
+    /// Print the OpenAPI document of the API
+    Openapi(openapi::Openapi),
     /// The radio module by hand
     #[command(subcommand)]
     Radio(radio::Radio),
@@ -168,6 +171,7 @@ impl Cli {
             Command::Decode(decode) => decode.run(),
             Command::Passes(passes) => passes.run(),
             Command::Look(look) => look.run(),
+            Command::Openapi(openapi) => openapi.run(),
             Command::Radio(radio) => radio.run(),
             Command::Rotator(rotator) => rotator.run(),
             Command::Rig(rig) => rig.run(),

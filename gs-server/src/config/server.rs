@@ -191,6 +191,8 @@ pub struct HttpSection {
     pub https: bool,
     /// Whether one may look without logging in. Default: on loopback, as long as there is no user.
     pub open_reading: Option<bool>,
+    /// Streams (WebSocket) that may be open at once; more are refused. Default 2048.
+    pub streams: usize,
 }
 
 impl Default for HttpSection {
@@ -201,6 +203,7 @@ impl Default for HttpSection {
             token_file: None,
             https: false,
             open_reading: None,
+            streams: 2048,
         }
     }
 }

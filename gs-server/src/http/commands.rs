@@ -14,7 +14,7 @@ use super::extract::{Id, Query, number, page, paged, satellite, scope, small, ti
 use super::problem::Failure;
 use super::write::Write;
 use crate::plan::condition_of;
-use crate::storage::{CommandLife, CommandQuery, CommandRow, StageRow};
+use crate::storage::{CommandLife, CommandQuery, CommandRow, StageRow, StoreError};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -42,7 +42,10 @@ pub(super) async fn list(
         page: page(asked.after, asked.before, asked.limit)?,
     };
     let commands = app.state.store.commands(&query).await?;
-    let views = commands.iter().map(|now| view(&now.command, now.last.as_ref())).collect::<Result<_, _>>()?;
+    let views = commands
+        .iter()
+        .map(|now| view(&now.command, now.last.as_ref()))
+        .collect::<Result<_, StoreError>>()?;
     Ok(Json(paged(views, &query.page, |command: &CommandView| command.id)))
 }
 
@@ -57,6 +60,11 @@ pub(super) fn whole_life(life: &CommandLife) -> Result<CommandView, Failure> {
     let mut command = view(&life.command, life.stages.last())?;
     command.stages = Some(life.stages.iter().map(stage_view).collect());
     Ok(command)
+}
+
+/// A command with its last stage alone.
+pub(super) fn short_life(life: &CommandLife) -> Result<CommandView, StoreError> {
+    view(&life.command, life.stages.last())
 }
 
 pub(super) async fn create(
@@ -113,7 +121,7 @@ pub(super) fn link(name: &str) -> Result<LinkId, Failure> {
     LinkId::new(name).map_err(|error| Failure::field(ProblemKind::UnknownLink, "link", error.to_string()))
 }
 
-fn view(row: &CommandRow, last: Option<&StageRow>) -> Result<CommandView, Failure> {
+fn view(row: &CommandRow, last: Option<&StageRow>) -> Result<CommandView, StoreError> {
     let arguments = telecommand::arguments(&row.telecommand()?);
     Ok(CommandView {
         id: number(row.id),

@@ -5,11 +5,12 @@ use api::{
 };
 use axum::Json;
 use axum::extract::State;
-use axum::http::HeaderValue;
+use axum::http::{HeaderMap, HeaderValue};
 use axum::response::{IntoResponse as _, Response};
 use tle::formats::Checksums;
 
 use super::App;
+use super::conditional;
 use super::extract::{ListQuery, Query, paged, satellite, whole};
 use super::problem::Failure;
 use super::write::{IDEMPOTENCY_REPLAYED, Write};
@@ -22,7 +23,8 @@ const TEXT: &str = "text";
 pub(super) async fn list(
     State(app): State<App>,
     Query(query): Query<ListQuery>,
-) -> Result<Json<Page<HeldElements>>, Failure> {
+    headers: HeaderMap,
+) -> Result<Response, Failure> {
     let (scope, page) = (query.scope(), query.page()?);
     if scope.link.is_some() {
         let message = "elements are of a satellite, not of a link: ask by satellite or station";
@@ -31,7 +33,15 @@ pub(super) async fn list(
     let state = &app.state;
     let now = state.timer.now().utc;
     let items = held(&state.store, state.elements.wanted(), &scope, &page, now).await?;
-    Ok(Json(paged(items, &page, |held| held.id)))
+    // Age changes with every look; whoever holds these very sets, judged alike, holds the list.
+    let which: Vec<_> = items.iter().map(|held| (held.id, held.in_use, held.level.as_str())).collect();
+    let tag = conditional::tag_of(format!("{which:?}").as_bytes());
+    let list: Page<HeldElements> = paged(items, &page, |held| held.id);
+    let body = serde_json::to_vec(&list).map_err(|error| {
+        tracing::error!(%error, "A list of elements could not be written.");
+        Failure::new(ProblemKind::Internal, "The list cannot be written.")
+    })?;
+    Ok(conditional::tagged("application/json", body, &tag, &headers))
 }
 
 pub(super) async fn sources(State(app): State<App>) -> Json<Page<ElementsSource>> {

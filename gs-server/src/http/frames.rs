@@ -53,7 +53,8 @@ fn decode(bytes: &[u8]) -> Result<PacketView, String> {
     frame.packet().map(|packet| PacketView::from_packet(&packet)).map_err(|error| error.to_string())
 }
 
-fn view(row: &FrameRow, receptions: Vec<ReceptionRow>) -> FrameView {
+/// A frame as the wire has it, not decoded.
+pub(super) fn view(row: &FrameRow, receptions: Vec<ReceptionRow>) -> FrameView {
     let packet_type = row.packet_type.map(small::<u8>);
     FrameView {
         id: number(row.id),

@@ -7,6 +7,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
 use super::App;
+use super::accept::check_accept;
 use super::hosts::is_same_origin;
 use super::problem::{Failure, render};
 
@@ -26,7 +27,8 @@ const HEADERS: [(HeaderName, &str); 6] = [
 /// The outermost layer.
 pub(super) async fn guard(State(app): State<App>, request: Request, next: Next) -> Response {
     let path = request.uri().path().to_owned();
-    let response = match check_host(&app, &request) {
+    let allowed = check_host(&app, &request).and_then(|()| check_accept(&path, request.headers()));
+    let response = match allowed {
         Ok(()) => next.run(request).await,
         Err(failure) => failure.into_response(),
     };

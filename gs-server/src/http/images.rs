@@ -3,11 +3,12 @@
 use api::{ChunkMap, ImageView, Page};
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse as _, Response};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::response::Response;
 use sha2::{Digest as _, Sha256};
 
 use super::App;
+use super::conditional;
 use super::extract::{Id, ListQuery, Query, number, paged, small, time};
 use super::problem::Failure;
 use crate::storage::{ChunkState, ImageRow};
@@ -29,7 +30,7 @@ pub(super) async fn get(State(app): State<App>, id: Id) -> Result<Json<ImageView
     image.map(|image| Json(view(image.image))).ok_or_else(|| Failure::no_such("image", id.0))
 }
 
-pub(super) async fn chunks(State(app): State<App>, id: Id) -> Result<Json<ChunkMap>, Failure> {
+pub(super) async fn chunks(State(app): State<App>, id: Id, headers: HeaderMap) -> Result<Response, Failure> {
     let image = app.state.store.image(id.row()).await?.ok_or_else(|| Failure::no_such("image", id.0))?;
     let letter = |chunk: &ChunkState| match (chunk.frame, chunk.conflicts.is_empty()) {
         (_, false) => '!',
@@ -39,14 +40,15 @@ pub(super) async fn chunks(State(app): State<App>, id: Id) -> Result<Json<ChunkM
     let count = |test: &dyn Fn(&ChunkState) -> bool| {
         small(image.chunks.iter().filter(|chunk| test(chunk)).count() as i64)
     };
-    Ok(Json(ChunkMap {
+    let map = ChunkMap {
         image: id.0,
         chunks: small(image.chunks.len() as i64),
         held: count(&|chunk| chunk.frame.is_some()),
         conflicts: count(&|chunk| !chunk.conflicts.is_empty()),
         map: image.chunks.iter().map(letter).collect(),
         frames: image.chunks.iter().map(|chunk| chunk.frame.map(number)).collect(),
-    }))
+    };
+    conditional::json(&map, &headers)
 }
 
 /// The file as far as it is held: what is missing is zero. `x-image-complete` says whether anything is.
@@ -54,19 +56,10 @@ pub(super) async fn file(State(app): State<App>, id: Id, headers: HeaderMap) -> 
     let image =
         app.state.store.image_bytes(id.row()).await?.ok_or_else(|| Failure::no_such("image", id.0))?;
     let tag = format!("\"{}\"", hex::encode(Sha256::digest(&image.bytes)));
-    let known = headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes());
-    let mut response = match known {
-        true => StatusCode::NOT_MODIFIED.into_response(),
-        false => image.bytes.into_response(),
-    };
+    let mut response = conditional::tagged("image/jpeg", image.bytes, &tag, &headers);
     let headers = response.headers_mut();
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("image/jpeg"));
-    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
     headers.insert(COMPLETE, HeaderValue::from_static(if image.complete { "true" } else { "false" }));
     headers.insert(CONTIGUOUS, HeaderValue::from(image.contiguous));
-    if let Ok(tag) = HeaderValue::try_from(tag) {
-        headers.insert(header::ETAG, tag);
-    }
     if let Ok(name) = HeaderValue::try_from(format!("inline; filename=\"image-{}.jpg\"", id.0)) {
         headers.insert(header::CONTENT_DISPOSITION, name);
     }

@@ -9,11 +9,13 @@
 //!
 //! What it does **not** do: decide anything (intents go to the engine), know SQL (the store answers), read a clock.
 
+mod accept;
 mod admit;
 mod antenna;
 mod approvals;
 mod clock;
 mod commands;
+mod conditional;
 mod downloads;
 mod elements;
 mod events;
@@ -25,6 +27,7 @@ mod images;
 mod keys;
 mod links;
 mod metrics;
+pub mod openapi;
 mod page;
 mod people;
 mod plans;
@@ -72,8 +75,8 @@ pub use antenna::RadioOnAir;
 pub use hosts::AllowedHosts;
 pub use token::{Token, TokenError};
 
-/// Streams that may be open at once; more are refused.
-const STREAMS_MAX: usize = 64;
+/// Bytes that the kernel keeps for one connection.
+const SEND_BUFFER: usize = 128 * 1024;
 
 /// Whom the handlers ask.
 #[derive(Clone)]
@@ -100,6 +103,8 @@ pub struct HttpState {
     pub identity: Identity,
     /// What a demo tells of itself; shown in the station's view.
     pub demo: Option<serde_json::Value>,
+    /// Streams that may be open at once; more are refused.
+    pub streams_max: usize,
     /// Cancelled when the server stops: open streams end.
     pub stop: CancellationToken,
 }
@@ -166,20 +171,24 @@ struct App {
     state: Arc<HttpState>,
     hosts: Arc<AllowedHosts>,
     streams: Arc<Semaphore>,
+    feed: stream::Feed,
     /// Turns of those who compute something long.
     computing: Arc<Semaphore>,
     rehearsals: Arc<rehearsals::Rehearsals>,
 }
 
-/// The API and the page.
+/// The API and the page. Within tokio: the feed of the streams runs from here on, until [`HttpState::stop`].
 pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
+    let (streams_max, stop) = (state.streams_max.min(Semaphore::MAX_PERMITS), state.stop.clone());
     let app = App {
         state: Arc::new(state),
         hosts: Arc::new(allowed_hosts),
-        streams: Arc::new(Semaphore::new(STREAMS_MAX)),
+        streams: Arc::new(Semaphore::new(streams_max)),
+        feed: stream::Feed::new(),
         computing: Arc::new(Semaphore::new(sky::COMPUTING_MAX)),
         rehearsals: Arc::default(),
     };
+    tokio::spawn(app.feed.clone().run(app.clone(), stop));
     routes::table()
         .into_iter()
         .fold(Router::new(), |router, route| route.add_to(router, &app))
@@ -201,6 +210,10 @@ pub async fn serve(
     let listener = listener.tap_io(|stream| {
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "A connection keeps Nagle's algorithm.");
+        }
+        // Else the kernel would keep megabytes for each client that takes nothing.
+        if let Err(error) = rustix::net::sockopt::set_socket_send_buffer_size(&*stream, SEND_BUFFER) {
+            tracing::debug!(%error, "A connection keeps its large buffer.");
         }
     });
     let router = router.into_make_service_with_connect_info::<std::net::SocketAddr>();

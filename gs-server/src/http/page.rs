@@ -1,10 +1,10 @@
 //! The pages, one for now and one for the coming days: static files that are compiled in. No request of it leaves this server.
 
 use axum::extract::Path;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse as _, Response};
-use sha2::{Digest as _, Sha256};
+use axum::http::HeaderMap;
+use axum::response::Response;
 
+use super::conditional;
 use super::problem::Failure;
 
 macro_rules! files {
@@ -15,10 +15,10 @@ macro_rules! files {
 }
 
 files! {
-    "agenda.js" "api.js" "coming.js" "commands.js" "console.css" "days.js" "dom.js" "door.css" "door.js"
-    "events.js" "favicon.svg" "format.js" "hands.js" "heartbeat.js" "held.js" "links.js" "login.js" "main.js"
-    "model.js" "notice.js" "passes.js" "picture.js" "plan.css" "plan.js" "runs.js" "session.js" "stream.js"
-    "tokens.css" "top.js" "welcome.js"
+    "agenda.js" "api.js" "coming.js" "commands.js" "console.css" "days.js" "docs.css" "docs.js" "dom.js"
+    "door.css" "door.js" "events.js" "favicon.svg" "format.js" "hands.js" "heartbeat.js" "held.js" "links.js"
+    "login.js" "main.js" "model.js" "notice.js" "passes.js" "picture.js" "plan.css" "plan.js" "runs.js"
+    "session.js" "stream.js" "tokens.css" "top.js" "welcome.js"
 }
 
 pub(super) async fn index(headers: HeaderMap) -> Response {
@@ -55,16 +55,6 @@ pub(super) async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result
 }
 
 /// Kept by the browser, but asked for each time: a new server brings its new page at once.
-fn answer(media_type: &'static str, content: &'static str, headers: &HeaderMap) -> Response {
-    let tag = format!("W/\"{}\"", hex::encode(&Sha256::digest(content)[..8]));
-    let is_known = headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes());
-    let mut response =
-        if is_known { StatusCode::NOT_MODIFIED.into_response() } else { content.into_response() };
-    let headers = response.headers_mut();
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(media_type));
-    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
-    if let Ok(tag) = HeaderValue::try_from(tag) {
-        headers.insert(header::ETAG, tag);
-    }
-    response
+pub(super) fn answer(media_type: &'static str, content: &'static str, headers: &HeaderMap) -> Response {
+    conditional::answer(media_type, content, headers)
 }

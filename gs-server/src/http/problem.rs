@@ -166,6 +166,9 @@ fn kind_of(status: StatusCode) -> (ProblemKind, &'static str) {
         StatusCode::METHOD_NOT_ALLOWED => {
             (ProblemKind::MethodNotAllowed, "The header Allow names the methods that this path takes.")
         }
+        StatusCode::NOT_ACCEPTABLE => {
+            (ProblemKind::NotAcceptable, "This path has no answer in a form that Accept names.")
+        }
         StatusCode::PAYLOAD_TOO_LARGE => (ProblemKind::BodyTooLarge, "A body may have 65536 bytes at most."),
         StatusCode::UNSUPPORTED_MEDIA_TYPE => {
             (ProblemKind::WrongMediaType, "Send Content-Type: application/json.")

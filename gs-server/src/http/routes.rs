@@ -12,7 +12,7 @@ use super::admit::{Policy, admit};
 use super::write::{guard_door, guard_write};
 use super::{
     App, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys, links, metrics,
-    page, people, plans, rehearsals, runs, schedule, session, sky, station, status, stream, telemetry,
+    openapi, page, people, plans, rehearsals, runs, schedule, session, sky, station, status, stream, telemetry,
 };
 use crate::people::Right::{Approve, Command, Look, ManagePeople, ManageStation, Plan};
 
@@ -102,6 +102,8 @@ pub(super) fn table() -> Vec<Route> {
         write("/api/v1/approvals/{id}/approve", Needs(Approve), approvals::approve),
         write("/api/v1/approvals/{id}/refuse", Needs(Command), approvals::refuse),
         read("/api/v1/transmissions", Needs(Look), approvals::transmissions),
+        read("/api/docs", Anyone, openapi::docs),
+        read("/api/v1/openapi.json", Anyone, openapi::serve),
         read("/api/v1/health", Anyone, status::health),
         read("/api/v1/version", Needs(Look), status::version),
         read("/api/v1/station", Needs(Look), station::get),

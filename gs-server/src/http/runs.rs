@@ -11,7 +11,7 @@ use mission::run::RunRecord;
 use super::extract::{Id, ListQuery, Query, number, paged, time};
 use super::problem::Failure;
 use super::{App, commands, downloads};
-use crate::storage::{PlanRow, Store, StoreError};
+use crate::storage::{PlanRow, RunRow, Store, StoreError};
 
 pub(super) async fn list(
     State(app): State<App>,
@@ -64,6 +64,12 @@ pub(super) async fn get(State(app): State<App>, id: Id) -> Result<Json<RunReport
         frames_heard: number(heard.frames),
         chunks_gained: number(heard.chunks),
     }))
+}
+
+/// A run of the archive as the wire has it.
+pub(super) async fn view_of(store: &Store, row: &RunRow) -> Result<RunView, StoreError> {
+    let name = plan_of(store, row.plan).await?.name;
+    Ok(view(&row.record()?, name))
 }
 
 async fn plan_of(store: &Store, id: i64) -> Result<PlanRow, StoreError> {

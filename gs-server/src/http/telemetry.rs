@@ -5,9 +5,12 @@ use std::collections::BTreeMap;
 use api::{Bucket, LatestValue, Page, ParameterView, ProblemKind, Sample, TelemetryPage, Time};
 use axum::Json;
 use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::Response;
 use serde::Deserialize;
 
 use super::App;
+use super::conditional;
 use super::extract::{Query, number, satellite, time, whole};
 use super::problem::Failure;
 use crate::storage::{self, Samples, TelemetryQuery};
@@ -100,7 +103,8 @@ pub(super) struct AskedLatest {
 pub(super) async fn latest(
     State(app): State<App>,
     Query(asked): Query<AskedLatest>,
-) -> Result<Json<Page<LatestValue>>, Failure> {
+    headers: HeaderMap,
+) -> Result<Response, Failure> {
     let satellite = satellite(&app, asked.satellite.as_deref())?;
     let latest = app.state.store.latest(satellite.as_str()).await?;
     // The values of one packet share their frame: few frames name station and link for all of them.
@@ -111,20 +115,23 @@ pub(super) async fn latest(
             place.insert(heard.map(|heard| (heard.frame.station, heard.frame.link)).unwrap_or_default());
         }
     }
-    let views = latest.into_iter().map(|value| {
-        let (station, link) = routes.get(&value.sample.frame).cloned().unwrap_or_default();
-        LatestValue {
-            parameter: value.parameter.name,
-            unit: value.parameter.unit,
-            value: value.sample.value,
-            at: time(value.sample.at_us),
-            frame: number(value.sample.frame),
-            satellite: value.parameter.satellite,
-            station,
-            link,
-        }
-    });
-    Ok(Json(whole(views.collect())))
+    let views: Vec<LatestValue> = latest
+        .into_iter()
+        .map(|value| {
+            let (station, link) = routes.get(&value.sample.frame).cloned().unwrap_or_default();
+            LatestValue {
+                parameter: value.parameter.name,
+                unit: value.parameter.unit,
+                value: value.sample.value,
+                at: time(value.sample.at_us),
+                frame: number(value.sample.frame),
+                satellite: value.parameter.satellite,
+                station,
+                link,
+            }
+        })
+        .collect();
+    conditional::json(&whole(views), &headers)
 }
 
 pub(super) async fn parameters(State(app): State<App>) -> Result<Json<Page<ParameterView>>, Failure> {

@@ -143,6 +143,11 @@ impl<T: DeserializeOwned> FromRequestParts<App> for Write<T> {
             tracing::error!(path = parts.uri.path(), "A write route is not declared as one in the table.");
             Failure::new(ProblemKind::Internal, "This path cannot be written.")
         })?;
+        // serde would take the fields of an object from a list, too.
+        if !checked.body.is_object() {
+            let message = "The body must be an object in braces.";
+            return Err(Failure::new(ProblemKind::WrongShape, message));
+        }
         let body = serde_path_to_error::deserialize(&checked.body).map_err(|error| {
             let (path, inner) = (error.path().to_string(), error.inner().to_string());
             let message = if path == "." { inner } else { format!("{path}: {inner}") };

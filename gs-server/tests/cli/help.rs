@@ -38,6 +38,7 @@ fn every_verb_tells_what_it_does() {
             "gs-server-decode",
             "gs-server-passes",
             "gs-server-look",
+            "gs-server-openapi",
             "gs-server-radio",
             "gs-server-radio-list",
             "gs-server-radio-probe",

@@ -1,7 +1,9 @@
 //! A real store in a temporary folder and a real engine, heard by a satellite made of bytes.
 
+mod client;
 mod elements;
 mod operations;
+mod openapi;
 mod page;
 mod people;
 mod plans;
@@ -142,6 +144,7 @@ impl Bench {
             people: people.clone(),
             identity,
             demo: Some(json!({"speed": 1.0})),
+            streams_max: 64,
             stop: stop.clone(),
         };
         let router = router(state, AllowedHosts::new(address, &[HOST.to_owned()]));

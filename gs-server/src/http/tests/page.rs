@@ -10,7 +10,7 @@ use crate::clock::wall_sleep;
 async fn every_file_that_the_page_names_is_served_with_its_type() {
     let bench = Bench::new().await;
     let mut texts = Vec::new();
-    for path in ["/", "/plan", "/login", "/welcome"] {
+    for path in ["/", "/plan", "/login", "/welcome", "/api/docs"] {
         let page = bench.get(path).await;
         assert_eq!(page.header("content-type"), "text/html; charset=utf-8");
         assert!(page.header("content-security-policy").contains("default-src 'self'"), "{path}");
@@ -43,7 +43,8 @@ async fn every_file_that_the_page_names_is_served_with_its_type() {
 #[test]
 fn data_reaches_the_page_as_text_only_and_nothing_is_fetched_from_elsewhere() {
     for (page, module) in
-        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js")]
+        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js"),
+            (include_str!("../page/docs.html"), "docs.js")]
     {
         assert!(!page.contains("<style") && !page.contains(" style=") && !page.contains(" onclick"));
         assert_eq!(page.matches("<script").count(), 1);
@@ -74,7 +75,8 @@ fn data_reaches_the_page_as_text_only_and_nothing_is_fetched_from_elsewhere() {
 fn what_a_module_looks_for_is_in_its_page() {
     let module = |name: &str| FILES.iter().find(|(known, _)| *known == name).map_or("", |(_, text)| text);
     for (page, first) in
-        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js")]
+        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js"),
+            (include_str!("../page/docs.html"), "docs.js")]
     {
         let mut names = vec![first.to_owned()];
         let mut at = 0;

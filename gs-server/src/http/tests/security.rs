@@ -101,6 +101,7 @@ async fn every_write_is_refused_in_every_wrong_way() {
             ("undeclared", without(&path, "content-type"), 415, "wrong-media-type"),
             ("no JSON", body(write(&path, "k"), "{\"a\":"), 400, "bad-json"),
             ("a list", body(write(&path, "k"), "[1]"), 422, "wrong-shape"),
+            ("an empty list", body(write(&path, "k"), "[]"), 422, "wrong-shape"),
             ("unknown field", body(write(&path, "k"), r#"{"nonsense":1}"#), 422, "wrong-shape"),
         ];
         for (name, mut request, status, problem) in cases {

@@ -150,7 +150,7 @@ async fn a_client_that_speaks_is_let_go_and_a_stopping_server_says_so() {
 async fn a_65th_stream_is_refused_and_a_closed_one_makes_room() {
     let (_bench, address) = Bench::on_a_socket().await;
     let mut sockets = Vec::new();
-    for _ in 0..super::super::STREAMS_MAX {
+    for _ in 0..64 {
         sockets.push(open(address, "").await);
     }
     let refused = connect_async(format!("ws://{address}/api/v1/stream")).await;
@@ -163,4 +163,71 @@ async fn a_65th_stream_is_refused_and_a_closed_one_makes_room() {
         assert!(attempt < 200, "the place never became free");
         crate::clock::wall_sleep(Duration::from_millis(10)).await;
     }
+}
+
+/// What the server says when it closes.
+async fn end(mut socket: Socket) -> (u16, String) {
+    loop {
+        match within(Duration::from_secs(20), socket.next()).await.expect("an end in time") {
+            Some(Ok(Message::Close(Some(frame)))) => return (frame.code.into(), frame.reason.to_string()),
+            Some(Ok(_)) => {}
+            other => panic!("no word at the end: {other:?}"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn hostile_clients_are_let_go_with_a_word_and_harm_nobody() {
+    let (bench, address) = Bench::on_a_socket().await;
+    let mut friend = open(address, "?after=0&topics=events").await;
+    let cases = [
+        (Message::text("x".repeat(5000)), 1009, "4096"),
+        (Message::text("{\"type\":\"subscribe\",\"topics\":[\"all\"]}"), 1003, "understand"),
+        (Message::text("{\"type\":\"subscribe\",\"topics\":[],\"satellites\":[\"moon\"]}"), 1008, "moon"),
+        (Message::text(format!("{}1{}", "[".repeat(2000), "]".repeat(2000))), 1003, "understand"),
+        (Message::binary(vec![0; 10]), 1003, "understand"),
+    ];
+    for (message, code, word) in cases {
+        let mut socket = open(address, "?topics=commands").await;
+        socket.send(message).await.unwrap();
+        let (found, reason) = end(socket).await;
+        assert_eq!(found, code, "{reason}");
+        assert!(reason.contains(word), "{reason}");
+    }
+    let mut flood = open(address, "?topics=commands").await;
+    for _ in 0..100 {
+        let _ = flood.send(Message::Ping(vec![1; 100].into())).await;
+    }
+    assert_eq!(end(flood).await, (1008, "too many messages".to_owned()));
+    bench.hear(&heartbeat(1.0)).await;
+    assert_eq!(events(&mut friend, 2).await, [1, 2]);
+}
+
+#[tokio::test]
+async fn what_is_asked_wrongly_is_refused_before_the_stream_opens() {
+    let bench = Bench::new().await;
+    for (query, problem) in [
+        ("topics=events,all", "bad-parameter"),
+        ("topic=events", "bad-parameter"),
+        ("satellite=moon", "unknown-satellite"),
+    ] {
+        assert_eq!(bench.get(&format!("/api/v1/stream?{query}")).await.problem(), problem, "{query}");
+    }
+}
+
+#[tokio::test]
+async fn an_event_is_written_once_for_all_streams() {
+    use super::super::stream::Prepared;
+    let (bench, _) = Bench::on_a_socket().await;
+    bench.hear(&heartbeat(1.0)).await;
+    bench.frames(1).await;
+    let events = bench.store.events(&crate::storage::EventQuery::default()).await.unwrap();
+    let heard = events.into_iter().find(|event| event.record.subject.frame.is_some()).unwrap();
+    let prepared = Prepared::new(std::sync::Arc::new(heard));
+    for topic in [api::Topic::Events, api::Topic::Frames, api::Topic::Telemetry] {
+        let first = prepared.text(topic, &bench.store).await.unwrap().unwrap();
+        let second = prepared.text(topic, &bench.store).await.unwrap().unwrap();
+        assert_eq!(first.as_str().as_ptr(), second.as_str().as_ptr(), "{topic}");
+    }
+    assert_eq!(prepared.text(api::Topic::Commands, &bench.store).await.unwrap(), None);
 }

@@ -1,0 +1,313 @@
+//! One method for each operation.
+
+use super::{
+    ACCEPT, Client, ClientError, Duration, Filter, HeaderMap, HeaderValue, IF_NONE_MATCH, IdempotencyKey,
+    Method, StatusCode, bytes, segment,
+};
+use crate::{
+    AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, DownloadRequest,
+    DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView, Health,
+    HeldElements, ImageView, LatestValue, LimitView, LookList, Nothing, Outcome, Page, ParameterView,
+    PassKept, PassList, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, TelemetryPage,
+    Time, Version,
+};
+
+/// A fetch asks several sources one after the other.
+const FETCH_PATIENCE: Duration = Duration::from_secs(900);
+
+/// The file of an image as far as it is held: what is missing is zero.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImageFile {
+    /// The JPEG.
+    pub bytes: Vec<u8>,
+    /// Every chunk is held.
+    pub complete: bool,
+    /// How many bytes from the beginning are held.
+    pub contiguous_bytes: u64,
+    /// Names this very content: ask with it for what is newer.
+    pub tag: Option<String>,
+}
+
+macro_rules! reads {
+    ($($(#[$meta:meta])* $name:ident -> $answer:ty = $path:literal;)*) => {
+        impl Client {
+            $($(#[$meta])*
+            ///
+            /// # Errors
+            /// [`ClientError`].
+            pub async fn $name(&self) -> Result<$answer, ClientError> {
+                self.get($path, &Filter::new()).await
+            })*
+        }
+    };
+}
+
+macro_rules! lists {
+    ($($(#[$meta:meta])* $name:ident -> $answer:ty = $path:literal;)*) => {
+        impl Client {
+            $($(#[$meta])*
+            ///
+            /// # Errors
+            /// [`ClientError`].
+            pub async fn $name(&self, filter: &Filter) -> Result<$answer, ClientError> {
+                self.get($path, filter).await
+            })*
+        }
+    };
+}
+
+macro_rules! ones {
+    ($($(#[$meta:meta])* $name:ident -> $answer:ty = $path:literal;)*) => {
+        impl Client {
+            $($(#[$meta])*
+            ///
+            /// # Errors
+            /// [`ClientError`].
+            pub async fn $name(&self, id: u64) -> Result<$answer, ClientError> {
+                self.get(&$path.replacen('*', &id.to_string(), 1), &Filter::new()).await
+            })*
+        }
+    };
+}
+
+/// Verbs on something that has a name or a number.
+macro_rules! verbs {
+    ($($(#[$meta:meta])* $name:ident($of:ty) = $path:literal;)*) => {
+        impl Client {
+            $($(#[$meta])*
+            ///
+            /// # Errors
+            /// [`ClientError`].
+            pub async fn $name(&self, of: $of, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
+                let of = segment(&of.to_string());
+                self.post(&$path.replacen('*', &of, 1), &Nothing {}, key).await
+            })*
+        }
+    };
+}
+
+reads! {
+    /// The handshake: who is there and what it can.
+    version -> Version = "version";
+    /// How the station is right now.
+    station -> StationView = "station";
+    /// Rotator and rig, and what the radio bears.
+    antenna -> AntennaView = "antenna";
+    /// Which values there are.
+    parameters -> Page<ParameterView> = "parameters";
+    /// Values that have been judged by their limits.
+    limits -> Page<LimitView> = "limits";
+    /// The plans in use.
+    plans -> Page<PlanView> = "plans";
+    /// Which plan gets which pass of the coming two days, and why.
+    schedule -> ScheduleView = "schedule";
+    /// Where elements are fetched from, and how it stands with each.
+    sources -> Page<ElementsSource> = "elements/sources";
+}
+
+lists! {
+    /// Raw frames, newest first.
+    frames -> Page<FrameView> = "frames";
+    /// One parameter over time: `parameter`, `satellite`, `start`, `stop`, `max_points`.
+    telemetry -> TelemetryPage = "telemetry";
+    /// The newest value of each parameter.
+    latest -> Page<LatestValue> = "telemetry/latest";
+    /// Telecommands with their last stage; also `key`, `stage`.
+    commands -> Page<CommandView> = "commands";
+    /// Standing orders for images.
+    downloads -> Page<DownloadView> = "downloads";
+    /// Images that were declared.
+    images -> Page<ImageView> = "images";
+    /// What happened; also `kind`, `level`, `key`.
+    events -> Page<EventView> = "events";
+    /// Who did what.
+    audit -> Page<AuditView> = "audit";
+    /// Elements held.
+    elements -> Page<HeldElements> = "elements";
+    /// Passes of a window of time: `satellite`, `start`, `stop`, `min_elevation`, `frequency`.
+    passes -> PassList = "passes";
+    /// Passes that began.
+    passes_history -> Page<PassKept> = "passes/history";
+    /// Where satellites stand: `satellite`, `at`, `frequency`.
+    look -> LookList = "look";
+    /// What became of plans in passes.
+    runs -> Page<RunView> = "runs";
+}
+
+ones! {
+    /// One frame, decoded field by field.
+    frame -> FrameView = "frames/*";
+    /// One command with all its stages.
+    command -> CommandView = "commands/*";
+    /// One download.
+    download -> DownloadView = "downloads/*";
+    /// One image.
+    image -> ImageView = "images/*";
+    /// Which chunks of an image are held.
+    image_chunks -> ChunkMap = "images/*/chunks";
+    /// The report of one run.
+    run -> RunReport = "runs/*";
+}
+
+verbs! {
+    /// Withdraws a command that was not radiated.
+    cancel_command(u64) = "commands/*/cancel";
+    /// Asks for no more of an image.
+    cancel_download(u64) = "downloads/*/cancel";
+    /// The link may transmit.
+    arm_link(&str) = "links/*/arm";
+    /// The link must not transmit any more.
+    disarm_link(&str) = "links/*/disarm";
+    /// The plan may run.
+    arm_plan(&str) = "plans/*/arm";
+    /// The plan must not run any more.
+    disarm_plan(&str) = "plans/*/disarm";
+    /// Takes a satellite over from the plan that runs.
+    hold(&str) = "satellites/*/hold";
+    /// Gives it back.
+    release(&str) = "satellites/*/release";
+    /// I know why counter and witness of this key disagree.
+    confirm_counter(&str) = "keys/*/confirm-counter";
+}
+
+impl Client {
+    /// Whether the server can do its work; an answer also when it cannot.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn health(&self) -> Result<Health, ClientError> {
+        let url = self.url("health", &Filter::new())?;
+        let answer = super::timers::within(super::PATIENCE, self.http.get(url.clone()).send()).await;
+        let no_answer = |why| ClientError::NoAnswer { url: url.to_string(), why };
+        let response = answer
+            .ok_or_else(|| no_answer("it takes too long".to_owned()))?
+            .map_err(|error| no_answer(super::chain(error)))?;
+        match response.status() {
+            StatusCode::OK | StatusCode::SERVICE_UNAVAILABLE => super::read(response, &url).await,
+            _ => Err(super::problem(response, &url).await),
+        }
+    }
+
+    /// Has a telecommand sent.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn send_command(
+        &self,
+        request: &CommandRequest,
+        key: &IdempotencyKey,
+    ) -> Result<Outcome, ClientError> {
+        self.post("commands", request, key).await
+    }
+
+    /// Has an image brought home.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn order_download(
+        &self,
+        request: &DownloadRequest,
+        key: &IdempotencyKey,
+    ) -> Result<Outcome, ClientError> {
+        self.post("downloads", request, key).await
+    }
+
+    /// Adds elements of one satellite.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn add_elements(
+        &self,
+        request: &ElementsRequest,
+        key: &IdempotencyKey,
+    ) -> Result<ElementsAdded, ClientError> {
+        self.post("elements", request, key).await
+    }
+
+    /// Has the sources of elements asked, as far as they allow; the answer comes after theirs.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn fetch_elements(&self, key: &IdempotencyKey) -> Result<FetchReport, ClientError> {
+        self.write(Method::POST, "elements/fetch", &Nothing {}, key, FETCH_PATIENCE).await
+    }
+
+    /// Says that this machine's clock is right.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn vouch_clock(&self, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
+        self.post("clock/vouch", &Nothing {}, key).await
+    }
+
+    /// Hands a plan over; it is not armed.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn add_plan(&self, plan: &PlanText, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
+        self.post("plans", plan, key).await
+    }
+
+    /// Takes a plan out of use.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn withdraw_plan(&self, name: &str, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
+        self.delete(&format!("plans/{}", segment(name)), key).await
+    }
+
+    /// Chooses the pass in which this instant lies for a plan.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn attach_plan(
+        &self,
+        name: &str,
+        at: Time,
+        key: &IdempotencyKey,
+    ) -> Result<Outcome, ClientError> {
+        self.post(&format!("plans/{}/attach", segment(name)), &AttachRequest { at }, key).await
+    }
+
+    /// Takes that choice back.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn detach_plan(
+        &self,
+        name: &str,
+        at: Time,
+        key: &IdempotencyKey,
+    ) -> Result<Outcome, ClientError> {
+        self.post(&format!("plans/{}/detach", segment(name)), &AttachRequest { at }, key).await
+    }
+
+    /// The file of an image; `None` when what carries the tag `known` is still the newest.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn image_file(&self, id: u64, known: Option<&str>) -> Result<Option<ImageFile>, ClientError> {
+        let url = self.url(&format!("images/{id}/file"), &Filter::new())?;
+        let mut request = self.http.get(url.clone()).header(ACCEPT, "image/jpeg");
+        if let Some(known) = known.and_then(|tag| HeaderValue::try_from(tag).ok()) {
+            request = request.header(IF_NONE_MATCH, known);
+        }
+        let response = self.send(request, &url, super::PATIENCE).await?;
+        if response.status() == StatusCode::NOT_MODIFIED {
+            return Ok(None);
+        }
+        let headers = response.headers().clone();
+        Ok(Some(ImageFile {
+            bytes: bytes(response, &url).await?,
+            complete: text(&headers, "x-image-complete") == Some("true"),
+            contiguous_bytes: text(&headers, "x-image-contiguous-bytes")
+                .and_then(|bytes| bytes.parse().ok())
+                .unwrap_or(0),
+            tag: text(&headers, "etag").map(str::to_owned),
+        }))
+    }
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name).and_then(|value| value.to_str().ok())
+}
