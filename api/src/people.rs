@@ -7,6 +7,7 @@ use crate::Time;
 
 /// Logs somebody in.
 #[derive(Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LoginRequest {
     /// The user's name.
@@ -17,6 +18,7 @@ pub struct LoginRequest {
 
 /// Sets a password by a one-time link.
 #[derive(Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WelcomeRequest {
     /// The code of the link: what stands behind `#code=`.
@@ -36,6 +38,7 @@ pub struct WelcomeRequest {
 
 /// Exchanges one's own password.
 #[derive(Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PasswordRequest {
     /// The present one.
@@ -60,6 +63,7 @@ hidden!(LoginRequest, WelcomeRequest, PasswordRequest, TokenMade, LinkMade);
 
 /// Who asks, as the server sees it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SessionView {
     /// As records name them: a user, `token:NAME`, or `local` for the server's own token; `null`: nobody is logged in.
     pub name: Option<String>,
@@ -77,6 +81,7 @@ pub struct SessionView {
 
 /// A user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct UserView {
     /// The name; never given to somebody else.
     pub name: String,
@@ -100,6 +105,7 @@ pub struct UserView {
 
 /// Makes a user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct UserRequest {
     /// 1 to 32 of `a-z`, `0-9`, `-`, `_`.
@@ -116,6 +122,7 @@ pub struct UserRequest {
 
 /// Changes a user; what is missing stays.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct UserChange {
     /// Another role.
@@ -134,6 +141,7 @@ pub struct UserChange {
 
 /// A one-time link, told once.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LinkMade {
     /// Whose; `null`: it makes the first administrator.
     pub user: Option<String>,
@@ -145,6 +153,7 @@ pub struct LinkMade {
 
 /// A machine's token; the token itself was told once.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TokenView {
     /// Its name; never used again.
     pub name: String,
@@ -164,6 +173,7 @@ pub struct TokenView {
 
 /// Makes a token.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TokenRequest {
     /// 1 to 32 of `a-z`, `0-9`, `-`, `_`.
@@ -179,6 +189,7 @@ pub struct TokenRequest {
 
 /// A token, told once.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TokenMade {
     /// The token itself. It is not kept: nobody can tell it again.
     pub secret: String,
@@ -188,6 +199,7 @@ pub struct TokenMade {
 
 /// Something that needs, or needed, a second person.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ApprovalView {
     /// Its number.
     pub id: u64,
@@ -222,6 +234,7 @@ pub struct ApprovalView {
 
 /// Says yes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ApproveRequest {
     /// The digest that was shown.
@@ -230,6 +243,7 @@ pub struct ApproveRequest {
 
 /// Says no, or takes back what one asked for.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RefuseRequest {
     /// Why.
@@ -239,6 +253,7 @@ pub struct RefuseRequest {
 
 /// Who answered for one radiation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TransmissionView {
     /// The command.
     pub command: u64,

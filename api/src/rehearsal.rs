@@ -8,6 +8,7 @@ use crate::{FineTime, PlanFinding, PlanText, Time};
 
 /// What is to be rehearsed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RehearsalRequest {
     /// The plan; `null`: the plan in use that `name` says.
@@ -59,6 +60,7 @@ impl RehearsalRequest {
 
 /// A rehearsal that was asked for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RehearsalView {
     /// Its number, until the server stops.
     pub id: u64,
@@ -86,6 +88,7 @@ pub struct RehearsalView {
 
 /// What may be expected of a plan in its pass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RehearsalAnswer {
     /// It was rehearsed.
     pub ok: bool,
@@ -119,6 +122,7 @@ pub struct RehearsalAnswer {
 
 /// The pass of a rehearsal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RehearsedPass {
     /// Its AOS.
     pub aos: FineTime,
@@ -138,6 +142,7 @@ pub struct RehearsedPass {
 
 /// What was achieved, over all runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RehearsedFigures {
     /// Telecommands asked for.
     pub commands_asked: Percentiles,
@@ -161,6 +166,7 @@ pub struct RehearsedFigures {
 
 /// A figure over many runs: between `p10` and `p90` lies the next run with a chance of 80 %, drawn as these were.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Percentiles {
     /// One run in ten is at or below this.
     pub p10: f64,
@@ -172,6 +178,7 @@ pub struct Percentiles {
 
 /// What became of one step in all runs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RehearsedStep {
     /// Where it stands in the plan.
     pub place: String,
@@ -194,6 +201,7 @@ pub struct RehearsedStep {
 
 /// How runs ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RehearsedEnd {
     /// As in a run's `outcome`, or `missed`, `dropped`, `waiting`.
     pub end: String,
@@ -205,6 +213,7 @@ pub struct RehearsedEnd {
 
 /// What came of one run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RehearsedRun {
     /// Its seed; with it the run is played again.
     pub seed: u64,

@@ -65,6 +65,7 @@ pub struct ScheduleView {
 
 /// A time in which nothing is planned.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ClosedView {
     /// Its begin.
     pub start: Time,
@@ -76,6 +77,7 @@ pub struct ClosedView {
 
 /// A time in which the station may transmit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct OpenView {
     /// Its begin.
     pub start: Time,

@@ -11,8 +11,9 @@ use super::admit::Policy::{Anyone, LoggedIn, Needs};
 use super::admit::{Policy, admit};
 use super::write::{guard_door, guard_write};
 use super::{
-    App, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys, links, metrics,
-    openapi, page, people, plans, rehearsals, runs, schedule, session, sky, station, status, stream, telemetry,
+    App, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys, links,
+    metrics, openapi, page, people, plans, rehearsals, runs, schedule, session, sky, station, status, stream,
+    telemetry,
 };
 use crate::people::Right::{Approve, Command, Look, ManagePeople, ManageStation, Plan};
 

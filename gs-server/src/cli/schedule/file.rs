@@ -206,6 +206,8 @@ fn ground(words: StationWords, at: &str) -> Result<Ground, String> {
         licence: words.licence,
         blackouts: words.blackouts,
         switch_over_s: words.switch_over_s,
+        call_sign: String::new(),
+        licence_text: String::new(),
     };
     let told = |error: ConfigError| placed(error, at);
     let place = section.site().map_err(told)?.ok_or_else(|| format!("{at}: it has no place"))?;

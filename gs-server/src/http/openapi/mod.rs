@@ -3,6 +3,7 @@
 //! The document is a snapshot in `docs/openapi.json`, served at `/api/v1/openapi.json`, printed by `gs-server openapi`.
 
 mod operation;
+mod people;
 mod table;
 
 use std::sync::LazyLock;
@@ -28,13 +29,14 @@ const ABOUT: &str = "Ground station and mission control. Reading needs no token,
     key. Times are RFC 3339 in UTC; unknown is `null`, never 0; units stand in the names. Answers may grow fields: ignore \
     those you do not know. Every error is a `Problem` with a stable `type`.";
 
-const TAGS: [(&str, &str); 6] = [
+const TAGS: [(&str, &str); 7] = [
     ("server", "The program itself"),
     ("station", "How the station is, and what an operator switches"),
     ("archive", "What was heard and what happened"),
     ("uplink", "Telecommands and images"),
     ("sky", "Elements, passes, where the satellites are"),
     ("plans", "Plans, which pass each gets, what became of it"),
+    ("people", "Who may come in, and what needs a second person"),
 ];
 
 /// The document.

@@ -65,6 +65,8 @@ pub(in crate::http) struct Doc {
     headers: Vec<(&'static str, &'static str)>,
     problems: Vec<ProblemKind>,
     schemas: Schemas,
+    /// Whoever comes has nothing to show yet: no token, no key.
+    is_door: bool,
 }
 
 fn doc(method: &'static str, path: &'static str, tag: &'static str, id: &'static str) -> Doc {
@@ -84,6 +86,7 @@ fn doc(method: &'static str, path: &'static str, tag: &'static str, id: &'static
         headers: Vec::new(),
         problems: Vec::new(),
         schemas: Vec::new(),
+        is_door: false,
     }
 }
 
@@ -110,6 +113,11 @@ impl Doc {
     pub(super) fn query(mut self, params: &[Param]) -> Self {
         self.params.extend_from_slice(params);
         self
+    }
+
+    /// Who writes here has no token and needs no idempotency key.
+    pub(super) fn door(self) -> Self {
+        Self { is_door: true, ..self }
     }
 
     /// The answer is JSON of this shape.
@@ -219,8 +227,6 @@ impl Doc {
         if self.is_write() {
             all.extend([
                 K::OriginRefused,
-                K::IdempotencyKeyRequired,
-                K::IdempotencyKeyReused,
                 K::WrongMediaType,
                 K::BodyTooLarge,
                 K::BadJson,
@@ -228,6 +234,9 @@ impl Doc {
                 K::Overloaded,
                 K::Stopping,
             ]);
+        }
+        if self.is_write() && !self.is_door {
+            all.extend([K::Csrf, K::IdempotencyKeyRequired, K::IdempotencyKeyReused]);
         }
         all.sort_by_key(|kind| (kind.status(), kind.word()));
         all.dedup();
@@ -265,7 +274,7 @@ impl Doc {
                     .schema(Some(schema(param.kind))),
             );
         }
-        if self.is_write() {
+        if self.is_write() && !self.is_door {
             operation = operation.parameter_ref(Ref::new("#/components/parameters/IdempotencyKey"));
             operation = operation.security(SecurityRequirement::new("token", std::iter::empty::<String>()));
         }

@@ -18,12 +18,12 @@ const THE_SATELLITE: Param =
 const STATION: Param = param("station", Kind::Text, "Only of this station.");
 const LINK: Param = param("link", Kind::Text, "Only of this link.");
 const KEY: Param = param("key", Kind::Text, "Only with this key id.");
-const AFTER: Param =
+pub(super) const AFTER: Param =
     param("after", Kind::Whole(i64::MIN, i64::MAX), "Upwards from here: what follows this number.");
-const BEFORE: Param =
+pub(super) const BEFORE: Param =
     param("before", Kind::Whole(i64::MIN, i64::MAX), "Downwards from here: what precedes this number.");
-const LIMIT: Param = param("limit", Kind::Whole(1, 1000), "Entries of a page; 100 when left out.");
-const LIST: [Param; 6] = [SATELLITE, STATION, LINK, AFTER, BEFORE, LIMIT];
+pub(super) const LIMIT: Param = param("limit", Kind::Whole(1, 1000), "Entries of a page; 100 when left out.");
+pub(super) const LIST: [Param; 6] = [SATELLITE, STATION, LINK, AFTER, BEFORE, LIMIT];
 const START: Param = param("start", Kind::Time, "Begin of the window; now when left out.");
 const STOP: Param =
     param("stop", Kind::Time, "End of the window; two days after its begin when left out, 31 at most.");
@@ -36,7 +36,7 @@ const FREQUENCY: Param = param("frequency", Kind::Number(1e5, 1e12), "For Dopple
 const FORM: Param = param("form", Kind::OneOf(&["full", "compact"]), "With or without what surrounds it.");
 const THEME: Param = param("theme", Kind::OneOf(&["dark", "light"]), "Colours; `dark` when left out.");
 
-const INTENT: [K; 3] = [K::StorageFailing, K::Overloaded, K::Stopping];
+pub(super) const INTENT: [K; 3] = [K::StorageFailing, K::Overloaded, K::Stopping];
 const SKY: [K; 4] = [K::NoPlace, K::NoElements, K::UnknownSatellite, K::NotFound];
 const PLANS: [K; 3] = [K::UnknownPlan, K::PassRefused, K::BadParameter];
 
@@ -47,6 +47,8 @@ pub(in crate::http) fn table() -> Vec<Doc> {
     rows.extend(uplink());
     rows.extend(sky());
     rows.extend(plans());
+    rows.extend(super::people::rehearsals());
+    rows.extend(super::people::people());
     rows
 }
 

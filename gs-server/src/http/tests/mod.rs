@@ -2,8 +2,8 @@
 
 mod client;
 mod elements;
-mod operations;
 mod openapi;
+mod operations;
 mod page;
 mod people;
 mod plans;

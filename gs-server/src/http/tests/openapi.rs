@@ -11,7 +11,7 @@ use super::{Bench, heartbeat, request};
 
 fn method(access: Access) -> &'static str {
     match access {
-        Access::Write => "POST",
+        Access::Write | Access::Door => "POST",
         Access::Remove => "DELETE",
         Access::Read | Access::Stream => "GET",
     }

@@ -42,10 +42,11 @@ async fn every_file_that_the_page_names_is_served_with_its_type() {
 
 #[test]
 fn data_reaches_the_page_as_text_only_and_nothing_is_fetched_from_elsewhere() {
-    for (page, module) in
-        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js"),
-            (include_str!("../page/docs.html"), "docs.js")]
-    {
+    for (page, module) in [
+        (include_str!("../page/index.html"), "main.js"),
+        (include_str!("../page/plan.html"), "plan.js"),
+        (include_str!("../page/docs.html"), "docs.js"),
+    ] {
         assert!(!page.contains("<style") && !page.contains(" style=") && !page.contains(" onclick"));
         assert_eq!(page.matches("<script").count(), 1);
         assert!(page.contains(&format!("src=\"/page/{module}\"")));
@@ -74,10 +75,11 @@ fn data_reaches_the_page_as_text_only_and_nothing_is_fetched_from_elsewhere() {
 #[test]
 fn what_a_module_looks_for_is_in_its_page() {
     let module = |name: &str| FILES.iter().find(|(known, _)| *known == name).map_or("", |(_, text)| text);
-    for (page, first) in
-        [(include_str!("../page/index.html"), "main.js"), (include_str!("../page/plan.html"), "plan.js"),
-            (include_str!("../page/docs.html"), "docs.js")]
-    {
+    for (page, first) in [
+        (include_str!("../page/index.html"), "main.js"),
+        (include_str!("../page/plan.html"), "plan.js"),
+        (include_str!("../page/docs.html"), "docs.js"),
+    ] {
         let mut names = vec![first.to_owned()];
         let mut at = 0;
         while at < names.len() {

@@ -235,13 +235,18 @@ fn what_anybody_may_take_is_known_by_name() {
         table().into_iter().filter(|route| route.policy == Policy::Anyone).map(|r| r.path).collect();
     let known = [
         "/",
+        "/plan",
         "/favicon.ico",
         "/page/{file}",
+        "/healthz",
+        "/readyz",
         "/login",
         "/welcome",
         "/api/v1/session",
         "/api/v1/session",
         "/api/v1/welcome",
+        "/api/docs",
+        "/api/v1/openapi.json",
         "/api/v1/health",
     ];
     assert_eq!(open, known, "a path without any condition: is there really nothing in it that needs one?");
