@@ -14,7 +14,7 @@ fn doctor(folder: &Folder) -> (i32, Value) {
     let mut command = gs_server(["doctor", "--json", "--config"]);
     command.arg(folder.write_config());
     let (code, out, error) = run(command);
-    (code, serde_json::from_str(&out).unwrap_or_else(|_| Value::String(error)))
+    (code, serde_json::from_str(&out).unwrap_or(Value::String(error)))
 }
 
 fn finding<'a>(report: &'a Value, check: &str) -> &'a Value {
