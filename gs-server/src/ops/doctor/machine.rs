@@ -11,6 +11,7 @@ use super::{Finding, days, with_reasons};
 use crate::clock::{clock_offset_s, kernel_says_synchronised};
 use crate::config::{ClockSetting, Config, LinkKind, LinkSection};
 use crate::keys;
+use crate::links::serial::ports;
 use crate::ops::upkeep;
 
 pub(super) fn version() -> Finding {
@@ -133,7 +134,7 @@ fn port(link: &LinkSection, in_use: bool) -> Finding {
 
 fn path_of(link: &LinkSection) -> Option<String> {
     let Some(wanted) = &link.usb else { return link.port.clone() };
-    serialport::available_ports().ok()?.into_iter().find_map(|port| match &port.port_type {
+    ports().ok()?.into_iter().find_map(|port| match &port.port_type {
         SerialPortType::UsbPort(usb)
             if (usb.vid, usb.pid) == (wanted.vid, wanted.pid)
                 && wanted
