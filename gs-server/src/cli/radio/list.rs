@@ -6,6 +6,7 @@ use serialport::{SerialPortInfo, SerialPortType};
 
 use super::super::shell::{print_json, print_line};
 use super::{Exit, Failure};
+use crate::links::serial::ports;
 
 /// `gs-server radio list`.
 #[derive(Debug, Args)]
@@ -66,7 +67,7 @@ impl Port {
 
 impl List {
     pub(super) fn run(self) -> Result<Exit, Failure> {
-        let mut ports: Vec<Port> = serialport::available_ports()
+        let mut ports: Vec<Port> = ports()
             .map_err(|error| Failure::doing("serial ports cannot be listed", error))?
             .into_iter()
             .map(Port::new)

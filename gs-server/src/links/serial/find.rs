@@ -2,13 +2,22 @@
 
 use std::path::Path;
 
-use serialport::{ErrorKind, SerialPortType};
+use serialport::{ErrorKind, SerialPortInfo, SerialPortType};
 
 use crate::config::UsbId;
 
+/// The ports of this machine. Where there is no list of them, as in a container without `/sys`, there are none: the library
+/// would panic.
+///
+/// # Errors
+/// What the library says when the list cannot be read.
+pub(crate) fn ports() -> serialport::Result<Vec<SerialPortInfo>> {
+    if Path::new("/sys/class/tty").is_dir() { serialport::available_ports() } else { Ok(Vec::new()) }
+}
+
 /// Names of the ports of this machine, adapters first.
 pub fn port_names() -> Vec<String> {
-    let mut ports = serialport::available_ports().unwrap_or_default();
+    let mut ports = ports().unwrap_or_default();
     ports.sort_by_key(|port| (!matches!(port.port_type, SerialPortType::UsbPort(_)), port.port_name.clone()));
     ports.into_iter().map(|port| port.port_name).collect()
 }
@@ -33,7 +42,7 @@ pub(super) fn path(path: &str) -> Result<String, String> {
 }
 
 pub(super) fn usb(wanted: &UsbId) -> Result<String, String> {
-    let ports = serialport::available_ports().map_err(|error| format!("ports cannot be listed: {error}"))?;
+    let ports = ports().map_err(|error| format!("ports cannot be listed: {error}"))?;
     let found = ports.into_iter().find(|port| match &port.port_type {
         SerialPortType::UsbPort(usb) => {
             usb.vid == wanted.vid

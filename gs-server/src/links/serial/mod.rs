@@ -18,6 +18,7 @@ use super::port::{Connector, Port, PortContext};
 use crate::config::{AuxInput, LinkSection, UsbId, driver_config};
 
 pub use find::port_names;
+pub(crate) use find::ports;
 
 /// How long a read waits before the thread looks whether the port is still there.
 const READ_WAIT: Duration = Duration::from_millis(100);

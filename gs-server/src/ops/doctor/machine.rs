@@ -11,6 +11,7 @@ use super::{Finding, days, with_reasons};
 use crate::clock::{clock_offset_s, kernel_says_synchronised};
 use crate::config::{ClockSetting, Config, LinkKind, LinkSection};
 use crate::keys;
+use crate::links::serial;
 use crate::ops::upkeep;
 
 pub(super) fn version() -> Finding {
@@ -100,8 +101,8 @@ pub(super) fn backups(config: &Config, now: UtcUs) -> Option<Finding> {
 }
 
 pub(super) fn ports(config: &Config, in_use: bool) -> Vec<Finding> {
-    let serial = config.links.iter().filter(|link| link.kind == LinkKind::Serial);
-    serial.map(|link| port(link, in_use)).collect()
+    let wired = config.links.iter().filter(|link| link.kind == LinkKind::Serial);
+    wired.map(|link| port(link, in_use)).collect()
 }
 
 fn port(link: &LinkSection, in_use: bool) -> Finding {
@@ -133,7 +134,7 @@ fn port(link: &LinkSection, in_use: bool) -> Finding {
 
 fn path_of(link: &LinkSection) -> Option<String> {
     let Some(wanted) = &link.usb else { return link.port.clone() };
-    serialport::available_ports().ok()?.into_iter().find_map(|port| match &port.port_type {
+    serial::ports().ok()?.into_iter().find_map(|port| match &port.port_type {
         SerialPortType::UsbPort(usb)
             if (usb.vid, usb.pid) == (wanted.vid, wanted.pid)
                 && wanted
