@@ -1,5 +1,4 @@
 //! Clients of the API from outside: a crowd at the stream, and the example in Python.
-#![expect(clippy::expect_used, reason = "a test that cannot be set up has failed, loudly")]
 
 use std::process::{Command, Stdio};
 
