@@ -21,6 +21,8 @@ impl World {
         let mut image: Option<ImageSnapshot> = None;
         let mut downloads: Vec<DownloadRecord> = Vec::new();
         let mut elements = Vec::new();
+        let mut of_others: std::collections::BTreeMap<mission::SatelliteId, Vec<ElementSet>> =
+            std::collections::BTreeMap::new();
         let mut pass: Option<PassRecord> = None;
         let mut plans: Vec<mission::run::PlanRecord> = Vec::new();
         let mut runs: Vec<mission::run::RunRecord> = Vec::new();
@@ -28,7 +30,11 @@ impl World {
             match record {
                 Record::Elements(row) => {
                     ids.elements = row.id.0;
-                    elements.push(ElementSet { id: row.id, elements: Arc::clone(&row.elements) });
+                    let set = ElementSet { id: row.id, elements: Arc::clone(&row.elements) };
+                    match row.satellite == self.satellite {
+                        true => elements.push(set),
+                        false => of_others.entry(row.satellite.clone()).or_default().push(set),
+                    }
                 }
                 Record::Plan(row) => {
                     ids.plan = ids.plan.max(row.id.0);
@@ -104,7 +110,20 @@ impl World {
                 heartbeat: None,
                 elements,
                 pass: pass.filter(|pass| pass.ended_at.is_none()),
-            }],
+            }]
+            .into_iter()
+            .chain(of_others.into_iter().map(|(satellite, elements)| SatelliteSnapshot {
+                satellite,
+                last_tag: None,
+                commands: Vec::new(),
+                image: None,
+                downloads: Vec::new(),
+                limits: Vec::new(),
+                heartbeat: None,
+                elements,
+                pass: None,
+            }))
+            .collect(),
             plans: plans.into_iter().filter(|plan| plan.withdrawn_at.is_none()).collect(),
             runs: {
                 let ended = runs.iter().filter(|run| run.state == mission::run::RunState::Ended);
