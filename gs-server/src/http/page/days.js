@@ -39,7 +39,13 @@ export function paintDays() {
   }
   const hours = width > 900 ? 24 : width > 560 ? 12 : 8;
   const bands = [];
-  for (let from = agenda.start; from < agenda.stop; from += hours * HOUR_MS) bands.push(band(from, hours, width));
+  for (let from = agenda.start; from < agenda.stop; from += hours * HOUR_MS) {
+    const until = from + hours * HOUR_MS;
+    const isEmpty = !agenda.passes.some((pass) => ms(pass.aos) < until && ms(pass.los) > from);
+    // On a phone hours without a pass are not worth the way; the ones that last are.
+    if (isEmpty && hours < 24 && !(from <= now() && now() < until)) continue;
+    bands.push(band(from, hours, width));
+  }
   box.replaceChildren(...bands);
 }
 
