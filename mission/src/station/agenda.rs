@@ -29,6 +29,8 @@ pub(super) struct Agenda {
     names: Vec<Foretold>,
     memory: Vec<Remembered>,
     pub(super) fitness: Fitness,
+    /// Nothing was scheduled in this life yet.
+    is_first: bool,
     /// Revisions of all skies together, as scheduled last.
     skies: u64,
 }
@@ -88,10 +90,34 @@ impl Station {
             blackouts: self.times.blackouts.iter().map(blackout).chain(dead).collect(),
             policy: Policy::default(),
         };
+        if std::mem::take(&mut self.agenda.is_first) {
+            self.agenda.memory = self.recalled(&problem.candidates);
+        }
         let answer = schedule::plan(&problem, &self.agenda.memory);
         self.agenda.memory.clone_from(&answer.memory);
         self.plan_runs(now, &answer, &matches);
         self.agenda.schedule = Arc::new(answer);
+    }
+
+    /// What the last life had promised to armed plans: their planned runs were stored.
+    fn recalled(&self, candidates: &[Candidate]) -> Vec<Remembered> {
+        let ceil_s = |us: i64| us.div_euclid(1_000_000) + i64::from(us.rem_euclid(1_000_000) > 0);
+        let floor_s = |us: i64| us.div_euclid(1_000_000);
+        let planned = self.runs.iter().map(|run| &run.record).filter(|run| run.state == RunState::Planned);
+        let of_run = |run: &RunRecord| {
+            let pass = candidates.iter().find(|pass| {
+                pass.satellite == run.satellite && pass.aos < run.los_at && run.aos_at < pass.los
+            })?;
+            Some(Remembered {
+                key: pass.key.clone(),
+                aos_s: ceil_s(pass.aos.0),
+                los_s: floor_s(pass.los.0),
+                question: 0,
+                chosen: Some((self.antenna.clone(), ceil_s(run.aos_at.0), floor_s(run.los_at.0))),
+                ear: false,
+            })
+        };
+        planned.filter_map(of_run).collect()
     }
 
     /// The passes of one satellite that plans want.
@@ -308,26 +334,9 @@ impl Station {
 }
 
 impl Agenda {
-    /// To be drawn up, by what the last life had promised to armed plans: their runs are what was stored of it.
-    pub(super) fn after(runs: &[Run], antenna: &AntennaId) -> Self {
-        let promised = || runs.iter().map(|run| &run.record).filter(|run| run.state == RunState::Planned);
-        let mut names: Vec<Foretold> = Vec::new();
-        for run in promised() {
-            let keys = identify(&run.satellite, &run.station, &names, &[(run.aos_at, run.los_at)]);
-            names.extend(keys.into_iter().map(|key| Foretold { key, aos: run.aos_at, los: run.los_at }));
-        }
-        let remembered = |known: &Foretold| {
-            let (aos_s, los_s) = (-(-known.aos.0).div_euclid(1_000_000), known.los.0.div_euclid(1_000_000));
-            Remembered {
-                key: known.key.clone(),
-                aos_s,
-                los_s,
-                question: 0,
-                chosen: Some((antenna.clone(), aos_s, los_s)),
-                ear: false,
-            }
-        };
-        Self { is_stale: true, memory: names.iter().map(remembered).collect(), names, ..Self::default() }
+    /// To be drawn up for the first time in this life.
+    pub(super) fn at_start() -> Self {
+        Self { is_stale: true, is_first: true, ..Self::default() }
     }
 
     /// A station has one antenna, and it has the station's name.

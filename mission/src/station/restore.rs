@@ -51,10 +51,9 @@ pub(super) fn station(
             Some(Link::new(link.clone(), s, satellites[s].profile.rssi))
         })
         .collect();
-    let (antenna, runs) = (Agenda::antenna(&config.station), runs(&snapshot));
     let mut station = Station {
-        agenda: Agenda::after(&runs, &antenna),
-        antenna,
+        agenda: Agenda::at_start(),
+        antenna: Agenda::antenna(&config.station),
         station: config.station,
         me: Principal::engine(),
         entropy,
@@ -65,7 +64,7 @@ pub(super) fn station(
         site: config.site,
         times: config.times,
         antenna_fault: None,
-        runs,
+        runs: runs(&snapshot),
         unfinished: snapshot.runs.iter().filter(|run| is_unfinished(&run.progress)).cloned().collect(),
         last_ends: snapshot
             .runs

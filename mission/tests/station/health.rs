@@ -1,6 +1,7 @@
 //! A station that does not work gets no passes, says why, and gets them back; and a new life keeps what was promised.
 
 use mission::config::Times;
+use mission::plan::{MinPass, Plan};
 use mission::record::EventKind;
 use mission::run::RunState;
 use mission::{Input, Intent, LinkId, LinkState, SatelliteId};
@@ -91,12 +92,15 @@ fn twins() -> World {
 #[test]
 fn what_was_promised_stays_promised_in_the_next_life() {
     let mut world = twins();
-    hand_over(&mut world, plan("first", vec![send(Telecommand::Ping)])).unwrap();
+    // So long that one pass cannot serve both.
+    let whole = MinPass { max_elevation_deg: 0.0, duration_us: 400_000_000 };
+    hand_over(&mut world, Plan { min_pass: whole, ..plan("first", vec![send(Telecommand::Ping)]) }).unwrap();
     arm(&mut world, "first", true);
     // A little better, and not by the tenth that a promise gives way to.
     let mut rival = plan("second", vec![send(Telecommand::Ping)]);
     rival.satellite = SatelliteId::new("pixelsat-2").unwrap();
     rival.worth = 1.05;
+    rival.min_pass = whole;
     hand_over(&mut world, rival).unwrap();
     arm(&mut world, "second", true);
     let times = |world: &World| -> Vec<(String, i64, i64)> {
@@ -123,6 +127,7 @@ fn what_was_promised_stays_promised_in_the_next_life() {
         let mut other = plan(name, vec![send(Telecommand::Ping)]);
         other.satellite = SatelliteId::new(satellite).unwrap();
         other.worth = worth;
+        other.min_pass = whole;
         hand_over(&mut fresh, other).unwrap();
         arm(&mut fresh, name, true);
     }
