@@ -12,6 +12,7 @@ use tokio_tungstenite::tungstenite::client::IntoClientRequest as _;
 
 use super::{Answer, Bench, HOST, request};
 use crate::clock::within;
+use crate::engine::EngineMessage;
 use crate::people::Role;
 
 /// A browser: a cookie, and the word that goes with it.
@@ -375,6 +376,8 @@ async fn first_transmission(ask: impl AsyncFn(&Bench) -> Request<Body>) -> Value
     bench.somebody("otto", Role::Operator).await;
     let body = json!({"call_sign": "DL1OTT", "licence": "class A"});
     bench.send(root.write(Method::POST, "/api/v1/users/otto", "a", &body)).await.ok();
+    let link = mission::LinkId::new("e22").unwrap();
+    bench.inbox.send(EngineMessage::Link { link, state: mission::LinkState::Ok }).await;
     let ask = ask(&bench).await;
     bench.send(ask).await.ok();
     for _ in 0..1000 {
