@@ -27,7 +27,9 @@ use crate::elements::task::ElementsTask;
 use crate::elements::{Door, ElementsHandle, Fetcher, Wanted};
 use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, OsEntropy};
 use crate::hamlib::{self, AntennaTask};
-use crate::http::{self, AllowedHosts, HttpState, Identity, RadioOnAir, Token, TokenError};
+use crate::http::{
+    self, AllowedHosts, HttpState, Identity, RadioOnAir, Tls, TlsError, TlsFiles, Token, TokenError,
+};
 use crate::hub::Hub;
 use crate::keys::{self, KeyError};
 use crate::lifecycle::{Lifecycle, TaskFailure};
@@ -97,6 +99,8 @@ impl RunOptions {
 pub struct Ready {
     /// Where the API listens.
     pub address: SocketAddr,
+    /// Where it listens with TLS, if it does.
+    pub secure: Option<SocketAddr>,
     /// The engine.
     pub engine: EngineHandle,
     /// For sources of the caller's own, such as what is in view.
@@ -172,6 +176,9 @@ pub enum RunError {
     /// The token file.
     #[error(transparent)]
     Token(#[from] TokenError),
+    /// Certificate or key.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// The listener or the machine.
     #[error("{what}")]
     Io {
@@ -236,6 +243,7 @@ pub async fn run_with(
     let address = listener
         .local_addr()
         .map_err(|source| RunError::Io { what: "the listener has no address", source })?;
+    let secure = secure(&config, &timer).await?;
     // After the archive: the token file may lie in its folder, which is made with it.
     let token = Token::load_or_create(&config.token_file())?;
     let people = people(&config, &store, &timer, address).await?;
@@ -313,8 +321,20 @@ pub async fn run_with(
         streams_max: config.http.streams,
         stop: api.soft.clone(),
     };
-    let router = http::router(state, AllowedHosts::new(address, &config.http.allowed_hosts));
+    let mut hosts = AllowedHosts::new(address, &config.http.allowed_hosts);
+    if let Some((_, tls)) = &secure {
+        hosts = hosts.and(AllowedHosts::new(*tls, &config.http.allowed_hosts));
+    }
+    let router = http::router(state, hosts);
+    let secure_address = secure.as_ref().map(|(_, address)| *address);
     let serving = api.soft.clone();
+    if let Some(((listener, tls), address)) = secure {
+        let (router, stop) = (router.clone(), api.soft.clone());
+        api.spawn("API over TLS", async move {
+            http::serve_tls(listener, tls, router, stop).await.map_err(Into::into)
+        });
+        tracing::info!(%address, "browsers come over https://{address}/");
+    }
     api.spawn("API", async move { http::serve(listener, router, serving).await.map_err(Into::into) });
     if let Some(reload) = reload {
         let (engine, soft) = (handle.clone(), api.soft.clone());
@@ -327,6 +347,7 @@ pub async fn run_with(
     if let Some(ready) = ready {
         let is = Ready {
             address,
+            secure: secure_address,
             engine: handle.clone(),
             inbox: inbox.clone(),
             hub,
@@ -364,6 +385,20 @@ pub async fn run_with(
 }
 
 /// Who may come in. Sessions and links run on this machine's clock, however fast the station's own goes.
+/// A listener with TLS, and its address, where the configuration wants one.
+async fn secure(
+    config: &Config,
+    timer: &Arc<dyn Timer>,
+) -> Result<Option<((TcpListener, Tls), SocketAddr)>, RunError> {
+    let Some(section) = &config.http.tls else { return Ok(None) };
+    let files = TlsFiles { certificate: section.certificate.clone(), key: section.key.clone() };
+    let tls = Tls::new(files, Arc::clone(timer) as _)?;
+    let failed = |source| RunError::Io { what: "the address in http.tls.listen cannot be used", source };
+    let listener = TcpListener::bind(section.listen).await.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    Ok(Some(((listener, tls), address)))
+}
+
 async fn people(
     config: &Config,
     store: &Store,
@@ -373,9 +408,10 @@ async fn people(
     let settings = PeopleSettings {
         two_person: config.people.two_person == TwoPerson::Critical,
         approval_us: (config.people.approval_h * 3.6e9) as i64,
-        https: config.http.https,
+        https: config.http.https || config.http.tls.is_some(),
         open_reading: config.http.open_reading,
-        on_loopback: address.ip().to_canonical().is_loopback(),
+        on_loopback: address.ip().to_canonical().is_loopback()
+            && config.http.tls.as_ref().is_none_or(|tls| tls.listen.ip().to_canonical().is_loopback()),
         station: config.station.name.clone(),
         call_sign: config.station.call_sign.clone(),
         licence: config.station.licence_text.clone(),

@@ -51,7 +51,7 @@ pub use reload::Changes;
 pub use satellites::{CounterSetting, LimitSection, SatelliteSection, Thresholds};
 pub use server::{
     ClockSetting, HttpSection, LogSection, PeopleSection, SimulationSection, StationSection, StorageSection,
-    TwoPerson, WindowSection,
+    TlsSection, TwoPerson, WindowSection,
 };
 pub use station::{driver_config, station_config};
 
@@ -144,7 +144,8 @@ impl Config {
         let others = [&mut self.storage.folder].into_iter().chain(self.http.token_file.as_mut());
         let logins = self.elements.fetch.iter_mut().filter_map(|source| source.credentials_file.as_mut());
         let backup = self.backup.as_mut().map(|backup| &mut backup.folder);
-        for path in keys.chain(files).chain(others).chain(logins).chain(backup) {
+        let tls = self.http.tls.iter_mut().flat_map(|tls| [&mut tls.certificate, &mut tls.key]);
+        for path in keys.chain(files).chain(others).chain(logins).chain(backup).chain(tls) {
             if path.is_relative() {
                 *path = base.join(&*path);
             }

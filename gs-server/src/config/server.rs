@@ -189,6 +189,8 @@ pub struct HttpSection {
     pub token_file: Option<PathBuf>,
     /// Browsers reach the server over TLS, through a proxy on this machine. Default false.
     pub https: bool,
+    /// TLS of the server's own, on a second address; then browsers come over that one.
+    pub tls: Option<TlsSection>,
     /// Whether one may look without logging in. Default: on loopback, as long as there is no user.
     pub open_reading: Option<bool>,
     /// Streams (WebSocket) that may be open at once; more are refused. Default 2048.
@@ -202,10 +204,23 @@ impl Default for HttpSection {
             allowed_hosts: Vec::new(),
             token_file: None,
             https: false,
+            tls: None,
             open_reading: None,
             streams: 2048,
         }
     }
+}
+
+/// `[http.tls]`: TLS of the server's own.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TlsSection {
+    /// Address and port, e.g. `0.0.0.0:8443`.
+    pub listen: SocketAddr,
+    /// PEM file with the server's certificate, then those that lead to its authority.
+    pub certificate: PathBuf,
+    /// PEM file with the certificate's key, mode 0600.
+    pub key: PathBuf,
 }
 
 /// `[people]`: rules among those who may come in.

@@ -86,7 +86,11 @@ impl fmt::Display for Config {
             self.http.listen,
             self.http.allowed_hosts,
             self.token_file().display(),
-            if self.http.https { ", behind TLS" } else { "" },
+            match &self.http.tls {
+                Some(tls) => format!(", TLS at {}", tls.listen),
+                None if self.http.https => ", behind TLS".to_owned(),
+                None => String::new(),
+            },
             self.people.two_person,
         )?;
         if let Some(rotator) = &self.rotator {

@@ -30,14 +30,23 @@ impl AllowedHosts {
             }
         }
         // Browsers leave the usual port out.
-        if port == 80 {
+        for usual in [":80", ":443"].into_iter().filter(|usual| *usual == format!(":{port}")) {
             let short: Vec<String> =
-                names.iter().filter_map(|name| name.strip_suffix(":80")).map(str::to_owned).collect();
+                names.iter().filter_map(|name| name.strip_suffix(usual)).map(str::to_owned).collect();
             names.extend(short);
         }
         names.sort_unstable();
         names.dedup();
         Self(names)
+    }
+
+    /// These names and those of another address, e.g. with TLS.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
+        self.0.extend(other.0);
+        self.0.sort_unstable();
+        self.0.dedup();
+        self
     }
 
     /// Whether a `Host` header says one of these names.

@@ -43,6 +43,7 @@ mod station;
 mod status;
 mod stream;
 mod telemetry;
+mod tls;
 mod token;
 mod write;
 
@@ -73,6 +74,7 @@ use crate::storage::Store;
 
 pub use antenna::RadioOnAir;
 pub use hosts::AllowedHosts;
+pub use tls::{Tls, TlsError, TlsFiles, serve_tls};
 pub use token::{Token, TokenError};
 
 /// Bytes that the kernel keeps for one connection.

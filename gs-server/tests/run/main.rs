@@ -7,4 +7,5 @@ mod serial;
 mod start_and_end;
 mod support;
 mod tcp;
+mod tls;
 mod twin;
