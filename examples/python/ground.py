@@ -35,10 +35,11 @@ class Ground:
     def ask(self, path, body=None, key=None):
         """Reads a path, or writes to it when there is a body. Returns headers and bytes."""
         request = urllib.request.Request(f"{self.address}/api/v1/{path}")
+        if self.token:
+            request.add_header("Authorization", f"Bearer {self.token}")
         if body is not None:
             # The same key for the same intent: asked twice, it is done once.
             request.add_header("Idempotency-Key", key or str(uuid.uuid4()))
-            request.add_header("Authorization", f"Bearer {self.token}")
             request.add_header("Content-Type", "application/json")
             request.data = json.dumps(body).encode()
         try:
@@ -78,9 +79,10 @@ class Ground:
         line = socket.create_connection((url.hostname, url.port or 80), timeout=40)
         with line, line.makefile("rb") as read:
             key = base64.b64encode(os.urandom(16)).decode()
+            token = f"Authorization: Bearer {self.token}\r\n" if self.token else ""
             line.sendall(
                 f"GET {url.path}/api/v1/stream?{urllib.parse.urlencode(query)} HTTP/1.1\r\n"
-                f"Host: {url.netloc}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                f"Host: {url.netloc}\r\n{token}Connection: Upgrade\r\nUpgrade: websocket\r\n"
                 f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {key}\r\n\r\n".encode()
             )
             status = read.readline().decode()
@@ -140,7 +142,7 @@ def image(ground, wanted):
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--server", default="http://127.0.0.1:8700", help="address of the server")
-    arguments.add_argument("--token", type=pathlib.Path, help="the server's token file, for what is written")
+    arguments.add_argument("--token", type=pathlib.Path, help="a file with a token, for what not everybody may do")
     verbs = arguments.add_subparsers(required=True)
     verb = verbs.add_parser("follow", help="tell what happens")
     verb.add_argument("--after", type=int, help="begin after this event")
