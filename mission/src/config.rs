@@ -23,12 +23,12 @@ pub struct StationConfig {
     pub times: Times,
 }
 
-/// When a station may transmit, and when nothing is planned.
+/// When a station may transmit, and when it is closed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Times {
     /// It may transmit in these windows only; `None`: always.
     pub licence: Option<Vec<Window>>,
-    /// Nothing is planned in these: maintenance, wind, people on the roof; with the reason.
+    /// Nothing is planned and nothing is transmitted in these: maintenance, wind, people on the roof; with the reason.
     pub blackouts: Vec<(Window, String)>,
     /// Between two satellites the antenna needs this long, s.
     pub switch_over_s: u32,

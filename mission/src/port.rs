@@ -154,6 +154,14 @@ impl LinkState {
             Self::Failed { .. } => "failed",
         }
     }
+
+    /// Why, where there is a why.
+    pub fn why(&self) -> Option<&str> {
+        match self {
+            Self::Unavailable { reason } | Self::Failed { reason } => Some(reason),
+            Self::Ok | Self::Disabled => None,
+        }
+    }
 }
 
 /// What the engine asks of the world.

@@ -67,7 +67,7 @@ use crate::status::Status;
 use agenda::Agenda;
 use journal::Journal;
 use link::Link;
-use runner::Run;
+use runner::{LastEnd, Run};
 use satellite::Satellite;
 
 /// Where the engine's random bytes come from: the operating system, or a seed.
@@ -105,8 +105,8 @@ pub struct Station {
     runs: Vec<Run>,
     /// Of each plan the run that is to be finished in the next pass.
     unfinished: Vec<RunRecord>,
-    /// The LOS of the last run of each satellite.
-    last_ends: Vec<(SatelliteId, UtcUs)>,
+    /// The last run of each satellite that came to its end.
+    last_ends: Vec<LastEnd>,
     ids: LastIds,
     last_tx: u64,
     recent: VecDeque<Recent>,

@@ -42,7 +42,7 @@ pub struct StationSection {
     /// The station transmits within these windows only. Default: always.
     #[serde(default)]
     pub licence: Option<Vec<WindowSection>>,
-    /// Nothing is planned in these windows.
+    /// Nothing is planned and nothing is transmitted in these windows.
     #[serde(default)]
     pub blackouts: Vec<WindowSection>,
     /// The station's call sign: stands in the record of transmissions by whoever has none of his own. Default: none.

@@ -151,8 +151,10 @@ impl Condition {
             && view.heard_ago_us.is_none_or(|ago| ago > within_us)
         {
             let why = match view.heard_ago_us {
-                Some(ago) => format!("last heard {} s ago, not within {}", seconds(ago), seconds(within_us)),
-                None => "not heard yet".to_owned(),
+                Some(ago) => {
+                    format!("the satellite was last heard {} ago, {} is the most", span(ago), span(within_us))
+                }
+                None => "the satellite was not heard since the station started".to_owned(),
             };
             return not_yet(why, None);
         }
@@ -167,12 +169,12 @@ impl Guard {
     /// What is missing; `None` when it holds.
     fn missing(&self, view: &RunView<'_>) -> Option<String> {
         match view.telemetry.get(&self.parameter) {
-            None => Some(format!("{} was not heard yet", self.parameter)),
+            None => Some(format!("{} was not heard since the station started", self.parameter)),
             Some(reading) if reading.age_us > self.max_age_us => Some(format!(
-                "{} is {} s old, more than {}",
+                "the newest {} is {} old, {} is the most",
                 self.parameter,
-                seconds(reading.age_us),
-                seconds(self.max_age_us)
+                span(reading.age_us),
+                span(self.max_age_us)
             )),
             Some(Reading { value: None, .. }) => Some(format!("{} is invalid", self.parameter)),
             Some(Reading { value: Some(found), .. }) if self.op.holds(*found, self.value) => None,
@@ -194,6 +196,16 @@ fn not_yet(why: String, look_after_us: Option<u64>) -> Holds {
 /// Microseconds from one time to a later one; 0 when it is not later.
 pub(super) fn us_between(from: crate::UtcUs, to: crate::UtcUs) -> u64 {
     u64::try_from(to.0.saturating_sub(from.0)).unwrap_or(0)
+}
+
+/// For sentences: a time in the unit that people would take.
+fn span(us: u64) -> String {
+    const MINUTE_US: u64 = 60_000_000;
+    match us / MINUTE_US {
+        0..=3 => format!("{} s", seconds(us)),
+        minutes @ 4..=180 => format!("{minutes} min"),
+        minutes => format!("{} h", minutes / 60),
+    }
 }
 
 /// For sentences: seconds with one decimal at most.

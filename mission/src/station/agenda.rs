@@ -257,17 +257,17 @@ impl Station {
             }
         }
         self.runs.retain(|run| !run.record.state.is_final());
-        for (contact, plan) in wanted {
+        // Contacts end at whole seconds: one may be over while its pass still lasts.
+        for (contact, plan) in wanted.into_iter().filter(|(contact, _)| contact.stop > now.utc) {
             let taken = self.runs.iter().any(|run| {
                 run.record.satellite == contact.satellite
                     && contact.start < run.record.los_at
                     && run.record.aos_at < contact.stop
             });
             // A run that ended in this pass was its run.
-            let had = self
-                .last_ends
-                .iter()
-                .any(|(satellite, los)| *satellite == contact.satellite && contact.start < *los);
+            let had = self.last_ends.iter().any(|last| {
+                last.satellite == contact.satellite && last.was_in(contact.start, contact.stop, now.utc)
+            });
             if !taken && !had {
                 self.new_run(now, contact, plan);
             }
@@ -310,7 +310,28 @@ impl Station {
             None if self.is_unbelieved(&run.record.satellite) => {
                 "the elements tell no passes any more: add newer ones".to_owned()
             }
-            None => "by the newest elements the pass is gone, or no pass for this plan any more".to_owned(),
+            None => self.why_changed(answer, run),
+        }
+    }
+
+    /// Of a contact that nothing refused: another plan has it, or the pass has changed.
+    fn why_changed(&self, answer: &Schedule, run: &Run) -> String {
+        let (aos, los) = (run.record.aos_at, run.record.los_at);
+        let mut contacts = answer.contacts.iter().filter(|contact| {
+            contact.satellite == run.record.satellite && contact.start < los && aos < contact.stop
+        });
+        if let Some(plan) = contacts.find_map(|contact| contact.plan.as_deref()) {
+            return if plan == run.name.as_str() {
+                "the antenna comes to it at another time of the pass".to_owned()
+            } else {
+                format!("plan {plan} gets this pass")
+            };
+        }
+        let sat = self.satellites.iter().find(|sat| sat.id == run.record.satellite);
+        let still = sat.and_then(|sat| sat.sky.passes_ahead().find(|pass| pass.is_same_as(aos, Some(los))));
+        match still {
+            Some(_) => "by the newest elements it is not a pass that this plan asks for".to_owned(),
+            None => "by the newest elements there is no such pass".to_owned(),
         }
     }
 

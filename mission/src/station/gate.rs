@@ -58,6 +58,7 @@ impl Station {
             return Err(wait("another satellite's answer is awaited", Some(now.mono.plus(TAKE_TURNS_US))));
         }
         self.licence_gate(now, link.config.timing.uplink_us())?;
+        self.blackout_gate(now, link.config.timing.uplink_us())?;
         self.seal_gate(sat)?;
         link_gate(link, now, need.gate)?;
         contact_gate(sat, now, need.gate)?;
@@ -80,6 +81,22 @@ impl Station {
             }
             None => Err(wait("the licence allows no transmission any more", None)),
         }
+    }
+
+    /// No part of the transmission falls into a blackout: people may be on the roof.
+    fn blackout_gate(&self, now: Now, uplink_us: u64) -> Result<(), Wait> {
+        let end = now.utc.plus(i64::try_from(uplink_us).unwrap_or(i64::MAX));
+        let mut closed = self.times.blackouts.iter();
+        let Some((window, reason)) = closed.find(|(window, _)| window.start < end && now.utc < window.stop)
+        else {
+            return Ok(());
+        };
+        let until = clock_time(window.stop, now.utc);
+        let why = match reason.trim() {
+            "" => format!("the station is closed until {until}"),
+            reason => format!("the station is closed until {until} ({reason})"),
+        };
+        Err(Wait { why: why.into(), until: Some(mono_of(now, window.stop)) })
     }
 
     fn seal_gate(&self, sat: &Satellite) -> Result<(), Wait> {

@@ -9,7 +9,7 @@ use super::image::Assembly;
 use super::journal::Journal;
 use super::link::Link;
 use super::outcome::mono_of;
-use super::runner::Run;
+use super::runner::{LastEnd, Run};
 use super::satellite::{Before, Command, Download, Exchange, Satellite, Settling};
 use super::sealing::Sealer;
 use super::sky::Sky;
@@ -66,12 +66,7 @@ pub(super) fn station(
         antenna_fault: None,
         runs: runs(&snapshot),
         unfinished: snapshot.runs.iter().filter(|run| is_unfinished(&run.progress)).cloned().collect(),
-        last_ends: snapshot
-            .runs
-            .iter()
-            .filter(|run| run.state == RunState::Ended)
-            .map(|run| (run.satellite.clone(), run.los_at))
-            .collect(),
+        last_ends: snapshot.runs.iter().filter(|run| run.state == RunState::Ended).map(LastEnd::of).collect(),
         plans: snapshot.plans,
         ids: snapshot.last_ids,
         last_tx: 0,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::outcome::mono_of;
 use super::{About, Station};
 use crate::clock::{Now, UtcUs};
-use crate::id::{CommandId, DownloadId, PlanName, Principal};
+use crate::id::{CommandId, DownloadId, PlanName, Principal, SatelliteId};
 use crate::intent::{Accepted, CommandIntent};
 use crate::level::Level;
 use crate::plan::{
@@ -27,8 +27,14 @@ use crate::stage::Stage;
 const CHECK_BEFORE_US: i64 = 300_000_000;
 /// A run that waits for something that is missing looks again after this, microseconds.
 const WAIT_LOOK_US: u64 = 1_000_000;
+/// A clock that is set back by no more than this was right before, as far as passes go, microseconds.
+const CLOCK_STEP_US: i64 = 60_000_000;
 /// Rounds of asking within one step of the engine.
 const ROUNDS: usize = 64;
+
+/// Of a run that the station, running, never came to begin or to check.
+const PASSED_OVER: &str =
+    "the clock went past the whole pass at once: it was set forward, or the machine slept";
 
 /// A run with its machine.
 pub(super) struct Run {
@@ -41,6 +47,27 @@ pub(super) struct Run {
     asked: BTreeMap<Ordinal, AskState>,
     stored_revision: u64,
     checked: bool,
+}
+
+/// A run that came to its end: its pass has had its run.
+#[derive(Debug, Clone)]
+pub(super) struct LastEnd {
+    pub(super) satellite: SatelliteId,
+    aos: UtcUs,
+    los: UtcUs,
+    at: UtcUs,
+}
+
+impl LastEnd {
+    pub(super) fn of(run: &RunRecord) -> Self {
+        Self { satellite: run.satellite.clone(), aos: run.aos_at, los: run.los_at, at: run.at }
+    }
+
+    /// It was the run of the contact between these. A run that ended in what is still to come ended by a clock that was
+    /// wrong: the contact comes yet, and is owed its run.
+    pub(super) fn was_in(&self, start: UtcUs, stop: UtcUs, now: UtcUs) -> bool {
+        start < self.los && self.aos < stop && self.at <= now.plus(CLOCK_STEP_US)
+    }
 }
 
 impl Run {
@@ -186,7 +213,10 @@ impl Station {
             } else if !links.clone().any(|link| link.state == LinkState::Ok) {
                 let states: Vec<String> = links
                     .clone()
-                    .map(|link| format!("link {} is {}", link.config.id, link.state.name()))
+                    .map(|link| match link.state.why() {
+                        Some(why) => format!("link {} is {}: {why}", link.config.id, link.state.name()),
+                        None => format!("link {} is {}", link.config.id, link.state.name()),
+                    })
                     .collect();
                 hard.push(states.join(", "));
             } else if !links.clone().any(|link| link.may_transmit()) {
@@ -224,7 +254,7 @@ impl Station {
         let (aos, los, plan) = (run.record.aos_at, run.record.los_at, run.name.clone());
         let transmit = run.machine.plan().transmit;
         if now.utc >= los {
-            let why = run.record.state.why().unwrap_or("its pass went by").to_owned();
+            let why = run.record.state.why().unwrap_or(PASSED_OVER).to_owned();
             self.miss(now, at, why);
             return;
         }
@@ -400,8 +430,10 @@ impl Station {
         let progress = run.machine.progress().clone();
         let level = match end {
             RunEnd::Completed { failures: 0 } => Level::Normal,
-            RunEnd::Completed { .. } | RunEnd::Later | RunEnd::OutOfTime => Level::Watch,
-            RunEnd::Aborted { .. } | RunEnd::Unfinished | RunEnd::Stopped(_) => Level::Warning,
+            RunEnd::Completed { .. } | RunEnd::Later => Level::Watch,
+            RunEnd::Aborted { .. } | RunEnd::OutOfTime | RunEnd::Unfinished | RunEnd::Stopped(_) => {
+                Level::Warning
+            }
         };
         let message = format!("plan {plan} for {satellite}: {}", summary(end, &progress));
         self.plan_event(now.utc, s, level, message);
@@ -483,11 +515,14 @@ impl Station {
             }
             !is_over
         });
+        // Whatever contact it stood in the way of (by another clock, by other elements) may have its run now.
+        self.agenda.is_stale |= !gone.is_empty();
         for record in gone {
-            self.unfinished.retain(|other| other.plan != record.plan);
             if matches!(record.state, RunState::Ended) {
-                self.last_ends.retain(|(satellite, _)| *satellite != record.satellite);
-                self.last_ends.push((record.satellite.clone(), record.los_at));
+                self.last_ends.retain(|last| last.satellite != record.satellite);
+                self.last_ends.push(LastEnd::of(&record));
+                // A pass that was missed or given away finishes nothing.
+                self.unfinished.retain(|other| other.plan != record.plan);
             }
             if super::agenda::is_unfinished(&record.progress) {
                 self.unfinished.push(record);

@@ -427,3 +427,79 @@ fn plans_follow_no_elements_that_are_too_old_to_be_believed() {
     assert!(world.station.status(world.now).runs.is_empty());
     assert!(world.events(EventKind::Plan).iter().any(|text| text.contains("add newer ones")));
 }
+
+#[test]
+fn nothing_is_transmitted_in_a_blackout() {
+    let (_, passes) = world();
+    let closed = Window { start: passes[0].aos_at.plus(-1), stop: passes[0].los_at.unwrap() };
+    let blackouts = vec![(closed, "people on the roof".to_owned())];
+    let (mut world, _) = world_with(Times { blackouts, ..Times::default() });
+    let command = world.command(Telecommand::Ping);
+    to(&mut world, passes[0].tca_at);
+    world.heartbeat();
+    world.pass(5 * S);
+    assert!(world.note().contains("people on the roof"), "{}", world.note());
+    live(&mut world, passes[0].los_at.unwrap());
+    assert!(world.transmits.is_empty());
+    live(&mut world, passes[1].los_at.unwrap());
+    assert_eq!(world.stage(command), Stage::Answered);
+}
+
+#[test]
+fn run_by_a_clock_that_was_an_hour_ahead_leaves_the_true_pass_its_own() {
+    const HOUR_US: i64 = 3_600_000_000;
+    let (mut world, passes) = world();
+    hand_over(&mut world, plan("status", vec![send(Telecommand::Ping)])).unwrap();
+    arm(&mut world, "status", true);
+    let (aos, los) = (passes[1].aos_at, passes[1].los_at.unwrap());
+    to(&mut world, aos.plus(-HOUR_US - 600_000_000));
+    world.step_utc(HOUR_US);
+    live(&mut world, los.plus(10_000_000));
+    let of_pass = |world: &World| {
+        let runs = runs(world);
+        runs.into_iter()
+            .filter(|run| run.state == RunState::Ended && run.los_at.0.abs_diff(los.0) < S)
+            .count()
+    };
+    assert_eq!(of_pass(&world), 1);
+    world.step_utc(-HOUR_US);
+    world.handle(Input::Clock { synchronised: true });
+    // Not forgotten over a restart either.
+    world.restart();
+    world.link_state(LinkState::Ok);
+    live(&mut world, los.plus(10_000_000));
+    assert_eq!(of_pass(&world), 2);
+    // A second more or less is the same pass.
+    world.step_utc(-11_000_000);
+    live(&mut world, los.plus(10_000_000));
+    assert_eq!(of_pass(&world), 2);
+}
+
+#[test]
+fn pass_that_is_given_away_finishes_nothing() {
+    let (mut world, passes) = world();
+    let steps = (0..60)
+        .map(|_| Step { action: Action::Listen { for_us: 20 * S }, ..send(Telecommand::Ping) })
+        .collect();
+    hand_over(&mut world, Plan { at_los: AtLos::FinishLater, ..plan("long", steps) }).unwrap();
+    arm(&mut world, "long", true);
+    live(&mut world, passes[0].los_at.unwrap().plus(S as i64));
+    arm(&mut world, "long", false);
+    assert!(runs(&world).iter().any(|run| matches!(run.state, RunState::Dropped(_))));
+    arm(&mut world, "long", true);
+    live(&mut world, passes[1].los_at.unwrap().plus(S as i64));
+    let second = runs(&world).iter().filter(|run| run.state == RunState::Ended).nth(1).cloned().unwrap();
+    let begun = second.progress.results.first().map(|result| result.step.clone()).unwrap();
+    assert_ne!(begun, "steps[0]");
+}
+
+#[test]
+fn pass_that_another_plan_gets_says_so() {
+    let (mut world, _) = world();
+    hand_over(&mut world, plan("status", vec![send(Telecommand::Ping)])).unwrap();
+    arm(&mut world, "status", true);
+    hand_over(&mut world, Plan { priority: 1, ..plan("better", vec![send(Telecommand::Ping)]) }).unwrap();
+    arm(&mut world, "better", true);
+    let told = world.events(EventKind::Plan);
+    assert!(told.iter().any(|text| text.ends_with("plan better gets this pass")), "{told:?}");
+}

@@ -85,7 +85,7 @@ impl PlanRun {
             Some(Holds::Yes) => self.done(view, self.deepest(), StepEnd::Done),
             Some(Holds::Never(why)) => self.fail(view, self.deepest(), why, wishes),
             Some(Holds::NotYet { why, .. }) if left_us == 0 => {
-                let why = format!("{} s were not enough: {why}", seconds(length_us));
+                let why = format!("waited {} s in vain: {why}", seconds(length_us));
                 self.fail(view, self.deepest(), why, wishes)
             }
             Some(Holds::NotYet { look_after_us, .. }) => {

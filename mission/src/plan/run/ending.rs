@@ -70,7 +70,7 @@ impl PlanRun {
             None if rounds >= *at_most => self.done(view, outer, StepEnd::Done),
             Some(Holds::Never(why)) => self.fail(view, outer, why, wishes),
             Some(Holds::NotYet { why, .. }) if rounds >= *at_most => {
-                self.fail(view, outer, format!("{rounds} rounds were not enough: {why}"), wishes)
+                self.fail(view, outer, format!("{rounds} rounds, and still {why}"), wishes)
             }
             _ => {
                 self.progress.cursor.truncate(depth);
@@ -137,12 +137,6 @@ impl PlanRun {
                 }
             }
         }
-        let level = match &end {
-            RunEnd::Completed { failures: 0 } | RunEnd::Later => Level::Normal,
-            RunEnd::Completed { .. } | RunEnd::Unfinished | RunEnd::Stopped(_) => Level::Watch,
-            RunEnd::Aborted { .. } | RunEnd::OutOfTime => Level::Warning,
-        };
-        wishes.push(note(level, format!("plan {} ends: {}", self.plan.name, end.name())));
         wishes.push(Wish::Done(end.clone()));
         self.progress.end = Some(end);
         self.touch();
