@@ -33,6 +33,12 @@ pub enum Invariant {
     Bounded,
     /// The image on the ground equals the satellite's.
     ImageEqual,
+    /// Nothing radiates outside a pass, the licence or the contact of its plan, in a blackout, or unarmed.
+    InWindow,
+    /// A run that is over has a reason, was told, and stays over.
+    RunTold,
+    /// No run is left behind, no contact of an armed plan is without one.
+    NothingLeftBehind,
 }
 
 /// Something did not hold.

@@ -73,7 +73,8 @@ impl Store {
         Ok(reached)
     }
 
-    fn take(&mut self, record: &Record, reached: &mut Vec<Reached>) -> Result<(), String> {
+    /// Takes one record of a batch.
+    pub(crate) fn take(&mut self, record: &Record, reached: &mut Vec<Reached>) -> Result<(), String> {
         match record {
             Record::Frame(frame) => {
                 if frame.id.0 > self.last_ids.frame {
@@ -181,8 +182,8 @@ impl Store {
         Ok(())
     }
 
-    /// What a restart begins from.
-    pub(crate) fn snapshot(&self, satellite: &SatelliteId, key: KeyId) -> Snapshot {
+    /// What a restart begins from; without a key the satellite is only heard.
+    pub(crate) fn snapshot(&self, satellite: &SatelliteId, key: Option<KeyId>) -> Snapshot {
         let open = |c: &&StoredCommand| !c.stage.is_final() || c.stage == Stage::Unknown;
         let commands = self.commands.values().filter(open).map(|c| CommandSnapshot {
             record: c.record.clone(),
@@ -213,17 +214,21 @@ impl Store {
             }],
             plans: self.plans.values().filter(|plan| plan.withdrawn_at.is_none()).cloned().collect(),
             runs: {
-                let ended =
-                    self.runs.values().rev().find(|run| run.state == RunState::Ended).map(|run| run.id);
-                let later = |run: &RunRecord| run.progress.end == Some(RunEnd::Later);
-                let wanted = |run: &&RunRecord| !run.state.is_final() || later(run) || Some(run.id) == ended;
+                let ended = |run: &&RunRecord| run.state == RunState::Ended;
+                let newest = self.runs.values().rev().find(ended).map(|run| run.id);
+                let of_plan: BTreeMap<PlanId, RunId> =
+                    self.runs.values().filter(ended).map(|run| (run.plan, run.id)).collect();
+                let later = |run: &RunRecord| {
+                    run.progress.end == Some(RunEnd::Later) && of_plan.get(&run.plan) == Some(&run.id)
+                };
+                let wanted = |run: &&RunRecord| !run.state.is_final() || later(run) || Some(run.id) == newest;
                 self.runs.values().filter(wanted).cloned().collect()
             },
-            keys: vec![KeySnapshot {
+            keys: Vec::from_iter(key.map(|key| KeySnapshot {
                 key,
                 counter: self.counter,
                 witness: self.witness.map_or(Witness::Missing, Witness::At),
-            }],
+            })),
         }
     }
 

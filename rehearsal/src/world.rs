@@ -389,7 +389,7 @@ impl World {
 
     /// A new life of the engine, from what the store holds.
     fn start(&mut self) {
-        let snapshot = self.store.snapshot(&self.satellite, self.key.id());
+        let snapshot = self.store.snapshot(&self.satellite, Some(self.key.id()));
         let now = self.now();
         let config = self.station_config();
         let entropy = Box::new(Seeded(ChaCha8Rng::from_rng(&mut self.rng)));

@@ -102,6 +102,8 @@ pub struct DeviceStats {
     pub up_half_duplex: u64,
     /// Ground's packets for another address, channel or frequency.
     pub up_not_for_us: u64,
+    /// Frames that ground's module did not hear because a transmitter beside it was on the air.
+    pub down_deafened: u64,
     /// The largest Doppler shift that a frame had, either way, while the satellite was above the horizon, Hz. To be held
     /// against [`DOPPLER_TOLERANCE_HZ`]. 0 in a stored profile, which knows of no Doppler.
     pub doppler_max_hz: u32,
@@ -160,6 +162,8 @@ pub struct Device {
     radiating_us: (u64, u64),
     /// Time of the last step or input; nothing happens before it any more.
     now_us: u64,
+    /// When a transmitter beside the ground's module was on the air, the last two times.
+    deaf_us: [(u64, u64); 2],
     /// A moment at which the module claimed an event and had none.
     module_idle_us: Option<u64>,
     stats: DeviceStats,
@@ -194,6 +198,7 @@ impl Device {
             scheduled: 0,
             outbox: VecDeque::new(),
             radiating_us: (0, 0),
+            deaf_us: [(0, 0); 2],
             module_idle_us: None,
             stats: DeviceStats::default(),
         };
@@ -247,6 +252,11 @@ impl Device {
     pub fn set_orbit(&mut self, orbit: Orbit) {
         self.channel.sky_mut().exchange(&orbit);
         self.twin.set_orbit(orbit);
+    }
+
+    /// Another transmitter of the same station is on the air from here to there: ground's module hears nothing meanwhile.
+    pub fn deafen(&mut self, from_us: u64, until_us: u64) {
+        self.deaf_us = [self.deaf_us[1], (from_us, until_us)];
     }
 
     /// Why the elements have no state any more, told once: from then on the satellite is below the horizon.
@@ -366,6 +376,14 @@ impl Device {
                 self.schedule(end_us, Event::DownEnds);
             }
             Event::DownEnds => self.twin.sent(now_us),
+            Event::DownHeard { start_us, .. }
+                if self
+                    .deaf_us
+                    .iter()
+                    .any(|(from_us, until_us)| start_us < *until_us && *from_us < now_us) =>
+            {
+                self.stats.down_deafened += 1;
+            }
             Event::DownHeard { start_us, bytes, rssi_dbm } => {
                 self.module_idle_us = None;
                 self.module.air_receive_for(
