@@ -1,7 +1,5 @@
 //! A fortnight unattended: three satellites, two stations, and everything that goes wrong.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::collections::BTreeMap;
 use std::thread;
 

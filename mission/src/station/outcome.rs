@@ -96,7 +96,7 @@ impl Station {
         if command.stage.is_final() {
             return;
         }
-        let again = command.may_repeat();
+        let again = command.may_repeat() && !self.is_left_by_plan(s, id);
         let (attempt, allowed) = (command.attempt, command.record.attempts_allowed);
         self.stage(now, s, id, Stage::Unknown, why, None);
         if again {

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::outcome::mono_of;
+use super::wanted::BY_PLAN;
 use super::{About, Station};
 use crate::clock::{Now, UtcUs};
 use crate::id::{CommandId, DownloadId, PlanName, Principal, SatelliteId};
@@ -91,6 +92,11 @@ impl Run {
     /// Its pass lasts, and it has its hands on the satellite.
     pub(super) fn is_on(&self) -> bool {
         matches!(self.record.state, RunState::Running | RunState::Held)
+    }
+
+    /// It asked for this command.
+    pub(super) fn asks_for(&self, id: CommandId) -> bool {
+        self.asked.values().any(|state| matches!(state, AskState::Command(command, _) if *command == id))
     }
 
     /// Begins where the pass before ended.
@@ -358,7 +364,7 @@ impl Station {
     /// Does what a run wishes. True when it asked for something, and should hear what became of it.
     fn grant(&mut self, now: Now, s: usize, at: usize, wish: Wish) -> bool {
         let plan = self.runs[at].name.clone();
-        let who = Principal::new(&format!("plan:{plan}"));
+        let who = Principal::new(&format!("{BY_PLAN}{plan}"));
         let satellite = self.satellites[s].id.clone();
         match wish {
             Wish::Command {

@@ -12,6 +12,8 @@ use crate::id::CommandId;
 use crate::snapshot::SealedSnapshot;
 use crate::stage::Stage;
 
+/// Whoever queues a plan's commands is called so, before the plan's name.
+pub(super) const BY_PLAN: &str = "plan:";
 /// Two Resets are this far apart, in microseconds.
 const RESETS_APART_US: i64 = 60_000_000;
 
@@ -31,9 +33,19 @@ impl Station {
             Some((Stage::Expired, "its time ran out"))
         } else if record.download.is_some_and(is_over) {
             Some((Stage::Cancelled, "its download is over"))
+        } else if self.is_left_by_plan(s, id) {
+            Some((Stage::Cancelled, "its plan does not run any more"))
         } else {
             None
         }
+    }
+
+    /// A run asked for it, and the run is over.
+    pub(super) fn is_left_by_plan(&self, s: usize, id: CommandId) -> bool {
+        let Some(command) = self.satellites[s].commands.get(&id) else { return false };
+        let is_of_plan =
+            command.record.download.is_none() && command.record.principal.as_str().starts_with(BY_PLAN);
+        is_of_plan && !self.runs.iter().any(|run| run.is_on() && run.asks_for(id))
     }
 
     /// Two Resets shortly after each other could not be told apart by telemetry: the second waits until then.

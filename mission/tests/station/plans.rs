@@ -503,3 +503,23 @@ fn pass_that_another_plan_gets_says_so() {
     let told = world.events(EventKind::Plan);
     assert!(told.iter().any(|text| text.ends_with("plan better gets this pass")), "{told:?}");
 }
+
+#[test]
+fn what_a_stopped_plan_has_on_the_air_is_not_repeated() {
+    let (mut world, passes) = world();
+    hand_over(&mut world, plan("status", vec![send(Telecommand::Ping)])).unwrap();
+    arm(&mut world, "status", true);
+    to(&mut world, passes[0].aos_at.plus(20 * S as i64));
+    world.heartbeat();
+    world.pass(5 * S);
+    let command = world.last_tx().command;
+    world.radiate();
+    arm(&mut world, "status", false);
+    for _ in 0..4 {
+        world.pass(50 * S);
+        world.heartbeat();
+    }
+    assert_eq!(world.transmits.len(), 1, "{:?}", world.stages(command));
+    assert_eq!(world.stage(command), Stage::Unknown);
+    assert!(!world.stages(command)[1..].contains(&Stage::Queued));
+}

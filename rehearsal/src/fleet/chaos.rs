@@ -70,7 +70,7 @@ struct Draw {
 /// Everything that goes wrong in so many days; with `calm`, only elements arrive and pings are wanted.
 pub(super) fn happenings(seed: u64, days: u64, passes: &TruePasses, calm: bool) -> Vec<Happening> {
     let mut all = Vec::new();
-    for station in 0..STATIONS {
+    for (station, passes) in passes.iter().enumerate() {
         let rng = ChaCha8Rng::seed_from_u64(seed ^ (0xc4a0_5000 + station as u64));
         let mut draw = Draw { rng, station, outages: Vec::new(), all: Vec::new() };
         if !calm {
@@ -79,13 +79,13 @@ pub(super) fn happenings(seed: u64, days: u64, passes: &TruePasses, calm: bool) 
         for s in 0..SATELLITES {
             draw.elements(s, days);
             let is_commanded = COMMANDED_FROM[s] == station;
-            for pass in &passes[station][s] {
+            for pass in &passes[s] {
                 if !calm {
                     draw.in_pass(s, pass, is_commanded);
                 }
             }
             if is_commanded {
-                draw.desk(s, days, &passes[station][s]);
+                draw.desk(s, days, &passes[s]);
             }
         }
         all.append(&mut draw.all);
