@@ -127,6 +127,9 @@ fn command_stage(id: crate::CommandId, stage: Stage, provable: bool) -> Asked {
         Stage::Answered => Asked::Done,
         Stage::Unknown if !provable => Asked::Done,
         Stage::Queued | Stage::Sealed | Stage::Radiating | Stage::Radiated => Asked::Pending,
+        Stage::Unknown => Asked::Failed(format!(
+            "command {id} was radiated and not answered: nobody knows whether it was obeyed"
+        )),
         stage => Asked::Failed(format!("command {id} is {stage}")),
     }
 }
