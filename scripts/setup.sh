@@ -68,10 +68,11 @@ python() {
   fi
 }
 
-# End-to-end tests watch system calls, speak HTTP from outside, and drive hamlib's dummy rotator and rig.
+# End-to-end tests watch system calls, speak HTTP from outside, start PostgreSQL servers of their own, and drive hamlib's dummy rotator and rig.
 tools() {
   have strace || install_packages strace
   have curl || install_packages curl ca-certificates
+  { have psql && { have initdb || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1; }; } || install_packages postgresql
   { have rotctld && have rigctld; } || install_packages libhamlib-utils
 }
 

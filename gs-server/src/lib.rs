@@ -12,6 +12,7 @@
 //! | [`http`] | API v1, the stream, the first page |
 //! | [`clock`] | the machine's clock and simulated ones; the only place that reads time or sets a timer |
 //! | [`config`] | one TOML file, a struct per section |
+//! | `leases`, `others` | sharing a database with other servers: who may seal, what they heard |
 //! | [`lifecycle`] | how tasks live and die |
 //! | [`sky`] | elements to passes, looks, plots and calendars |
 //! | [`keys`], [`decode`] | key files; captures to JSON |
@@ -38,9 +39,11 @@ pub mod hamlib;
 pub mod http;
 pub mod hub;
 pub mod keys;
+mod leases;
 pub mod lifecycle;
 pub mod links;
 pub mod ops;
+mod others;
 pub mod people;
 pub mod plan;
 mod pointing;

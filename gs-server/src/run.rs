@@ -15,6 +15,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt as _;
 use futures_util::future::BoxFuture;
+use mission::port::ReservedFrame;
 use mission::{Clock as _, Entropy, Intent, LinkId, Principal, Snapshot, StationConfig, StationId, UtcUs};
 use protocol::{Key, KeyId};
 use tokio::net::TcpListener;
@@ -32,13 +33,14 @@ use crate::http::{
 };
 use crate::hub::Hub;
 use crate::keys::{self, KeyError};
+use crate::leases::Leases;
 use crate::lifecycle::{Lifecycle, TaskFailure};
 use crate::links::{self, LinkParts};
 use crate::ops::{sd, upkeep::UpkeepTask};
 use crate::people::{People, PeopleSettings};
 use crate::pointing::{Place, Steering};
 use crate::storage::reserve::ReserveError;
-use crate::storage::{EventQuery, Page, Store, StoreError, StoreOptions};
+use crate::storage::{EventQuery, Page, Postgres, Store, StoreError, StoreOptions};
 
 /// What requests under way may take at the end.
 const API_END: Duration = Duration::from_millis(600);
@@ -248,7 +250,12 @@ pub async fn run_with(
     let token = Token::load_or_create(&config.token_file())?;
     let people = people(&config, &store, &timer, address).await?;
     let snapshot = snapshot(&store, &station).await?;
-    let recovered = store.reserve_read().await?;
+    let kept = store.reserve_read().await?;
+    let was_empty = kept.is_empty();
+    let recovered = not_yet_stored(&store, kept).await?;
+    if recovered.is_empty() && !was_empty {
+        store.reserve_clear().await?;
+    }
     if !recovered.is_empty() {
         tracing::warn!(frames = recovered.len(), "{} raw frames come back from the reserve", recovered.len());
     }
@@ -261,6 +268,7 @@ pub async fn run_with(
         station.links.iter().map(|link| LinkPort::new(link.id.clone())).unzip();
     let identity = Identity::of(&station, config.is_simulated());
     let (antenna, antenna_tasks) = hamlib::antenna(config.rotator.as_ref(), config.rig.as_ref(), &timer)?;
+    let name = station.station.clone();
     let (place, radios_on_air) = (Place::of(&station), RadioOnAir::of(&station, &config));
     let ids: Vec<LinkId> = station.links.iter().map(|link| link.id.clone()).collect();
     let (engine, inbox, handle) = Engine::new(EngineParts {
@@ -294,6 +302,26 @@ pub async fn run_with(
         let steering =
             Steering::new(place, config.rotator.as_ref(), handle.clone(), inbox.clone(), antenna.clone());
         point(&radios, steering, antenna_tasks);
+    }
+    if store.is_shared() {
+        let speed = config.simulation.map_or(1.0, |simulation| simulation.speed);
+        let leases = Leases {
+            store: store.clone(),
+            engine: handle.clone(),
+            inbox: inbox.clone(),
+            timer: Arc::clone(&timer),
+            speed,
+        };
+        let stop = api.soft.clone();
+        api.spawn("leases", async move {
+            leases.run(stop).await;
+            Ok(())
+        });
+        let others = crate::others::follow(store.clone(), name, hub.clone(), inbox.clone(), api.soft.clone());
+        api.spawn("other stations", async move {
+            others.await;
+            Ok(())
+        });
     }
     let elements = elements(&config, &handle, &store, &timer, &api)?;
     if looks_after_itself {
@@ -491,6 +519,7 @@ pub(crate) async fn open_store(
                 folder: config.storage.folder.clone(),
                 station: Some(station.clone()),
                 simulated,
+                postgres: postgres(config)?,
                 max_page_count: config.storage.max_page_count,
                 reserve_bytes: config.storage.reserve_bytes,
             };
@@ -508,6 +537,28 @@ pub(crate) async fn open_store(
     } else {
         Err(RunError::StoreKind { simulated: store.is_simulated() })
     }
+}
+
+/// Owns what it reads with, as [`snapshot`] does.
+fn not_yet_stored(
+    store: &Store,
+    kept: Vec<ReservedFrame>,
+) -> BoxFuture<'static, Result<Vec<ReservedFrame>, StoreError>> {
+    let store = store.clone();
+    async move { store.not_yet_stored(kept).await }.boxed()
+}
+
+/// The shared database of the configuration, with its password.
+fn postgres(config: &Config) -> Result<Option<Postgres>, RunError> {
+    let Some(url) = &config.storage.database else { return Ok(None) };
+    // The address was checked with the configuration.
+    let postgres = Postgres::new(url).map_err(|problem| {
+        ConfigError::value("storage.database", problem, "Write postgres://user@host/database.")
+    })?;
+    Ok(Some(match &config.storage.password_file {
+        Some(file) => postgres.with_password_file(file)?,
+        None => postgres,
+    }))
 }
 
 /// Owns what it reads with: a future that borrows it is not `Send` enough for whoever spawns a run.

@@ -42,7 +42,7 @@ pub use id::{
 pub use intent::{Accepted, CommandIntent, Intent, IntentEnvelope, IntentReceipt, Refusal};
 pub use level::Level;
 pub use limits::{LimitRule, LimitState};
-pub use port::{Effect, Input, LinkState, MaybeRadiated, ReservedFrame, Transmit};
+pub use port::{Effect, Input, Lease, LinkState, MaybeRadiated, ReservedFrame, Transmit};
 pub use record::{Batch, Gate, Record, Source};
 pub use sky::{ElementSet, PassAhead, Site};
 pub use snapshot::Snapshot;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use protocol::{Counter, KeyId};
 
-use crate::clock::{Now, UtcUs};
-use crate::id::{BatchId, CommandId, IntentId, LinkId, SatelliteId, TxId};
+use crate::clock::{MonoUs, Now, UtcUs};
+use crate::id::{BatchId, CommandId, FrameId, IntentId, LinkId, SatelliteId, TxId};
 use crate::intent::{Accepted, IntentEnvelope, Refusal};
 use crate::level::Level;
 use crate::record::{Batch, EventKind, Route, Source};
@@ -27,6 +27,13 @@ pub enum Input<'a> {
     },
     /// A frame that the reserve kept while storage failed, brought back at start.
     Recovered(&'a ReservedFrame),
+    /// A frame of a satellite of ours that another station heard and stored: what it says of an image fills ours.
+    Elsewhere {
+        /// Its id, as that station gave it.
+        id: FrameId,
+        /// The frame.
+        frame: &'a ReservedFrame,
+    },
     /// A link came up, went down, or learnt something.
     Link {
         /// Which.
@@ -82,6 +89,13 @@ pub enum Input<'a> {
         /// Why, as a sentence.
         reason: &'a str,
     },
+    /// Several servers share this key: who may seal with it now. A key of which this is never told is ours alone.
+    Lease {
+        /// Which key.
+        key: KeyId,
+        /// Who may.
+        lease: Lease,
+    },
     /// Whether the kernel says that its clock is synchronised.
     Clock {
         /// Synchronised.
@@ -114,6 +128,23 @@ pub enum Input<'a> {
     Wake,
     /// Finish: nothing new is radiated.
     Stop,
+}
+
+/// Who may seal with a key that several servers share, and radiate what is sealed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Lease {
+    /// We may.
+    Ours {
+        /// Until then.
+        until: MonoUs,
+        /// The highest counter that any server has spent.
+        spent: Option<Counter>,
+    },
+    /// We may not.
+    NotOurs {
+        /// Why, as a sentence.
+        why: String,
+    },
 }
 
 /// Whether something may have been radiated.

@@ -127,6 +127,7 @@ impl Station {
         match input {
             Input::Bytes { link, bytes, source, received } => self.take_bytes(link, bytes, source, received),
             Input::Recovered(frame) => self.take_recovered(frame),
+            Input::Elsewhere { id, frame } => self.take_elsewhere(now, id, frame),
             Input::Link { link, state } => self.link_state(now, link, state),
             Input::TxStarted(tx) => self.tx_started(tx),
             Input::TxDone { tx, airtime_us, .. } => self.tx_done(now, tx, airtime_us),
@@ -155,6 +156,7 @@ impl Station {
             }
             Input::WitnessDone { key, counter } => self.witness_done(now, key, counter),
             Input::WitnessFailed { key, reason } => self.witness_failed(now, key, reason),
+            Input::Lease { key, lease } => self.lease(key, &lease),
             Input::Clock { synchronised } => self.synchronised = synchronised,
             Input::View { satellite, in_view } => {
                 if let Some(satellite) = self.satellites.iter_mut().find(|s| s.id == *satellite) {

@@ -53,7 +53,7 @@ fn modified(path: &Path) -> Option<SystemTime> {
     path.metadata().ok()?.modified().ok()
 }
 
-/// The newest source file of a crate: its manifest, and everything under `src` and `sqlite`.
+/// The newest source file of a crate: its manifest, and everything under `src`, `sqlite` and `postgres`.
 fn newest(room: &Path) -> Option<SystemTime> {
     fn walk(path: &Path) -> Option<SystemTime> {
         if !path.is_dir() {
@@ -61,7 +61,7 @@ fn newest(room: &Path) -> Option<SystemTime> {
         }
         path.read_dir().ok()?.flatten().filter_map(|entry| walk(&entry.path())).max()
     }
-    ["Cargo.toml", "src", "sqlite"].iter().filter_map(|part| walk(&room.join(part))).max()
+    ["Cargo.toml", "src", "sqlite", "postgres"].iter().filter_map(|part| walk(&room.join(part))).max()
 }
 
 fn build(path: &Path) {

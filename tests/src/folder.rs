@@ -15,6 +15,8 @@ pub struct Folder {
     dir: TempDir,
     /// Where the server listens.
     pub address: SocketAddr,
+    /// The name of the station.
+    pub name: String,
     /// Simulated seconds per second; real time when `None`.
     pub speed: Option<f64>,
     /// Seconds between heartbeats, at both ends.
@@ -56,6 +58,7 @@ impl Folder {
         let folder = Self {
             dir,
             address: free_address(),
+            name: "bench".to_owned(),
             speed: None,
             heartbeat_s: 60,
             ranges: false,
@@ -129,13 +132,14 @@ impl Folder {
     /// The configuration as text.
     #[must_use]
     pub fn config_text(&self) -> String {
-        let Self { address, heartbeat_s, ranges, station, satellite, sections, link, storage, log, .. } =
-            self;
+        let Self {
+            address, heartbeat_s, ranges, name, station, satellite, sections, link, storage, log, ..
+        } = self;
         let port = self.port();
         let mut text = format!(
             r#"
 [station]
-name = "bench"
+name = "{name}"
 clock = "trust"
 {station}
 [[satellites]]

@@ -105,6 +105,7 @@ impl Redecode {
             station: None,
             simulated,
             max_page_count: None,
+            postgres: None,
             reserve_bytes: 0,
         };
         let opened = match Store::open(options(false)).await {

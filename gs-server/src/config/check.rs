@@ -9,6 +9,7 @@ use super::links::{AuxInput, LinkKind, LinkSection, ModePinWiring};
 use super::satellites::{LimitSection, SatelliteSection};
 use super::station::driver_config;
 use super::{Config, ConfigError};
+use crate::storage::Postgres;
 
 /// Satellites, and links, that one server takes.
 const MOST: usize = 16;
@@ -109,6 +110,31 @@ impl Config {
             "storage.reserve_bytes",
             format!("{} bytes", self.storage.reserve_bytes),
             "Give 65,536 to 4,294,967,296.",
+        )?;
+        let Some(database) = &self.storage.database else {
+            return ensure(
+                self.storage.password_file.is_none(),
+                "storage.password_file",
+                "there is no storage.database that asks for a password",
+                "Give storage.database as well, or remove it.",
+            );
+        };
+        // The value is not repeated: it may hold a password.
+        Postgres::new(database).map(drop).map_err(|problem| {
+            let remedy = "Write postgres://user@host/database; the password goes into storage.password_file, PGPASSWORD or PGPASSFILE.";
+            ConfigError::value("storage.database", problem, remedy)
+        })?;
+        ensure(
+            self.backup.is_none(),
+            "backup",
+            "it copies a file, and the archive is a PostgreSQL",
+            "Remove the section, and back the database up with pg_dump on its server.",
+        )?;
+        ensure(
+            self.storage.max_page_count.is_none(),
+            "storage.max_page_count",
+            "it limits a file, and the archive is a PostgreSQL",
+            "Remove it, and watch the disk of the database's server.",
         )
     }
 

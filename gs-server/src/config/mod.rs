@@ -142,10 +142,11 @@ impl Config {
         let keys = self.satellites.iter_mut().filter_map(|satellite| satellite.key_file.as_mut());
         let files = self.links.iter_mut().filter_map(|link| link.file.as_mut());
         let others = [&mut self.storage.folder].into_iter().chain(self.http.token_file.as_mut());
+        let password = self.storage.password_file.as_mut();
         let logins = self.elements.fetch.iter_mut().filter_map(|source| source.credentials_file.as_mut());
         let backup = self.backup.as_mut().map(|backup| &mut backup.folder);
         let tls = self.http.tls.iter_mut().flat_map(|tls| [&mut tls.certificate, &mut tls.key]);
-        for path in keys.chain(files).chain(others).chain(logins).chain(backup).chain(tls) {
+        for path in keys.chain(files).chain(others).chain(logins).chain(backup).chain(tls).chain(password) {
             if path.is_relative() {
                 *path = base.join(&*path);
             }

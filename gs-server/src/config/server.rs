@@ -164,7 +164,15 @@ pub enum ClockSetting {
 pub struct StorageSection {
     /// The data folder; made with mode 0700 when it is not there.
     pub folder: PathBuf,
-    /// Bytes set aside for raw frames while the database takes nothing. Default 4 MiB (about 14,000 frames).
+    /// A PostgreSQL that several servers share, e.g. `postgres://ground@db.example/ground`, instead of a file in the
+    /// folder. Without a password: that comes from `password_file`, `PGPASSWORD` or `PGPASSFILE`.
+    #[serde(default)]
+    pub database: Option<String>,
+    /// A file of mode 0600 with the password for `database`.
+    #[serde(default)]
+    pub password_file: Option<PathBuf>,
+    /// Bytes set aside for raw frames while the database takes nothing. Default 4 MiB (8,190 frames: four and a half
+    /// hours of a heartbeat every two seconds).
     #[serde(default = "default_reserve")]
     pub reserve_bytes: u64,
     /// Pages of 4096 bytes that the database may grow to; no limit without it.

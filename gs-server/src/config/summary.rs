@@ -58,8 +58,12 @@ impl fmt::Display for Config {
         }
         writeln!(
             f,
-            "storage {}: reserve {} bytes, {}",
+            "storage {}{}: reserve {} bytes, {}",
             self.storage.folder.display(),
+            match &self.storage.database {
+                Some(database) => format!(" and {database}"),
+                None => String::new(),
+            },
             self.storage.reserve_bytes,
             match self.storage.max_page_count {
                 Some(pages) => format!("at most {pages} pages"),

@@ -61,6 +61,14 @@ fn each_wrong_value_names_its_key_and_a_remedy() {
         ("file = \"x\"", "port = \"/dev/ttyUSB0\"", "links[0].file"),
         ("heartbeat_period_s = 0", "name = \"pixelsat-1\"", "satellites[0].heartbeat_period_s"),
         ("reserve_bytes = 1", "folder = \"data\"", "storage.reserve_bytes"),
+        ("database = \"postgres://ada:secret@host/db\"", "folder = \"data\"", "storage.database"),
+        ("database = \"sqlite://x\"", "folder = \"data\"", "storage.database"),
+        ("password_file = \"x\"", "folder = \"data\"", "storage.password_file"),
+        (
+            "database = \"postgres://ada@host/db\"\nmax_page_count = 9",
+            "folder = \"data\"",
+            "storage.max_page_count",
+        ),
         ("[simulation]", "folder = \"data\"", "simulation"),
         (
             "[[satellites.limits]]\nparameter = \"heartbeat.temp\"\nabove = { hot = 40 }",
@@ -70,6 +78,7 @@ fn each_wrong_value_names_its_key_and_a_remedy() {
     ] {
         let error = refused(&with(line, after));
         assert!(error.contains(key) && error.ends_with('.'), "{line}: {error}");
+        assert!(!error.contains("secret"), "{line}: {error}");
     }
 }
 

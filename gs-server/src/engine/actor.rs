@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use mission::port::ReservedFrame;
-use mission::{Effect, Entropy, Input, MaybeRadiated, MonoUs, Now, Snapshot, Station, StationConfig, TxId};
+use mission::{
+    Effect, Entropy, Input, Lease, MaybeRadiated, MonoUs, Now, Snapshot, Station, StationConfig, TxId,
+};
 use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
@@ -77,6 +79,12 @@ impl Engine {
         let mut station = Station::new(station, snapshot, entropy, now);
         for frame in &recovered {
             station.handle(now, Input::Recovered(frame));
+        }
+        if store.is_shared() {
+            for sealing in station.status(now).sealing {
+                let lease = Lease::NotOurs { why: crate::leases::waiting(sealing.key) };
+                station.handle(now, Input::Lease { key: sealing.key, lease });
+            }
         }
         let vouched = timer.is_simulated() || clock == ClockSetting::Trust;
         station.handle(now, Input::Clock { synchronised: vouched });
@@ -186,6 +194,7 @@ impl Engine {
                 self.metrics.engine_input(self.timer.now().mono.since(received.mono));
                 self.handle(Input::Bytes { link: &link, bytes: &bytes, source, received });
             }
+            EngineMessage::Elsewhere { id, frame } => self.handle(Input::Elsewhere { id, frame: &frame }),
             EngineMessage::Link { link, state } => self.handle(Input::Link { link: &link, state }),
             EngineMessage::TxStarted(tx) => self.handle(Input::TxStarted(tx)),
             EngineMessage::TxDone { tx, airtime_us, measured } => {
@@ -200,6 +209,7 @@ impl Engine {
             EngineMessage::Notice { kind, level, message } => {
                 self.handle(Input::Notice { kind, level, message: &message });
             }
+            EngineMessage::Lease { key, lease } => self.handle(Input::Lease { key, lease }),
             EngineMessage::Antenna { fault } => self.handle(Input::Antenna { fault: fault.as_deref() }),
         }
     }
@@ -208,7 +218,7 @@ impl Engine {
         if let Some((intent, principal, key)) = self.intents.take(request) {
             let store = self.store.clone();
             self.background.start(self.timer.busy("looking an intent up"), async move {
-                Outcome::LookedUp { intent, result: store.find_intent(&principal, &key).await }
+                Outcome::LookedUp { intent, result: store.find_or_claim_intent(&principal, &key).await }
             });
         }
     }

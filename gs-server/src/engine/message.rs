@@ -2,8 +2,12 @@
 
 use std::sync::Arc;
 
+use mission::port::ReservedFrame;
 use mission::record::EventKind;
-use mission::{Level, LinkId, LinkState, MaybeRadiated, Now, SatelliteId, Source, Transmit, TxId, UtcUs};
+use mission::{
+    FrameId, Lease, Level, LinkId, LinkState, MaybeRadiated, Now, SatelliteId, Source, Transmit, TxId, UtcUs,
+};
+use protocol::KeyId;
 use tokio::sync::mpsc;
 
 use crate::clock::{BusyToken, Timer};
@@ -26,6 +30,13 @@ pub enum EngineMessage {
         source: Source,
         /// When the last of them was received.
         received: Now,
+    },
+    /// Another station heard this, and stored it under this id.
+    Elsewhere {
+        /// Its id.
+        id: FrameId,
+        /// The frame.
+        frame: Box<ReservedFrame>,
     },
     /// A link changed its state.
     Link {
@@ -60,6 +71,13 @@ pub enum EngineMessage {
         satellite: SatelliteId,
         /// As in [`mission::Input::View`].
         in_view: Option<Option<UtcUs>>,
+    },
+    /// Who may seal with a key that several servers share.
+    Lease {
+        /// Which key.
+        key: KeyId,
+        /// Who may.
+        lease: Lease,
     },
     /// How the rotator is.
     Antenna {

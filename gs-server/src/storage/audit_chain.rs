@@ -5,7 +5,7 @@
 //! prints it): whoever can write the database can make a whole new chain, but not one that ends in a head that
 //! somebody wrote down.
 //!
-//! Where several stations share a database each has a chain of its own: the upper bits of an id say whose.
+//! Where several stations share a database they have one chain: a row is numbered and tied while nobody else writes.
 
 use std::fmt;
 use std::fs::OpenOptions;
@@ -19,9 +19,10 @@ use futures_util::TryStreamExt as _;
 use sha2::{Digest as _, Sha256};
 use sqlx::{Connection as _, SqliteConnection};
 
+use super::db::{Connection, DbRow, sql};
 use super::row::{Row as _, select};
 use super::rows::{AuditLinkRow, AuditRow};
-use super::{DATABASE, StoreError, open};
+use super::{DATABASE, StoreError, lite};
 
 /// The file with the newest head, in the data folder.
 const HEAD_FILE: &str = "audit-head";
@@ -29,8 +30,6 @@ const HEAD_FILE: &str = "audit-head";
 const HEAD_BYTES_MAX: u64 = 256;
 /// What the first row of a chain is tied to.
 const BEGINNING: [u8; 32] = [0; 32];
-/// Ids below this bit count rows; what is above says whose they are.
-const CHAIN_SHIFT: u32 = 40;
 /// Findings that are told in full.
 const FINDINGS_MAX: usize = 20;
 
@@ -67,7 +66,7 @@ impl FromStr for AuditHead {
 pub struct AuditVerdict {
     /// Rows looked at.
     pub rows: u64,
-    /// The end of the chain (of the last one, where several stations share a database); `None`: there is no row.
+    /// The end of the chain; `None`: there is no row.
     pub head: Option<AuditHead>,
     /// How many things are wrong; 0: the audit is what was written.
     pub wrong: u64,
@@ -99,9 +98,8 @@ pub(super) fn link(before: &[u8; 32], row: &AuditRow) -> [u8; 32] {
 }
 
 /// What the next row is tied to.
-pub(super) async fn newest(connection: &mut SqliteConnection) -> Result<[u8; 32], StoreError> {
-    let found =
-        sqlx::query(select::<AuditLinkRow>("order by audit desc limit 1")).fetch_optional(connection).await?;
+pub(super) async fn newest(connection: &mut Connection) -> Result<[u8; 32], StoreError> {
+    let found = sql(select::<AuditLinkRow>("order by audit desc limit 1")).fetch_optional(connection).await?;
     found.as_ref().map_or(Ok(BEGINNING), |row| hash_of(&AuditLinkRow::read(row)?))
 }
 
@@ -110,22 +108,25 @@ fn hash_of(row: &AuditLinkRow) -> Result<[u8; 32], StoreError> {
 }
 
 /// Ties the rows of an audit that is older than the chain. One that has a chain already is left as it is.
-pub(super) async fn begin(connection: &mut SqliteConnection) -> Result<(), StoreError> {
-    let links: i64 =
-        sqlx::query_scalar("select count(*) from audit_links").fetch_one(&mut *connection).await?;
+pub(super) async fn begin(connection: &mut Connection) -> Result<(), StoreError> {
+    let links: i64 = sql("select count(*) from audit_links").scalar(&mut *connection).await?;
     if links > 0 {
         return Ok(());
     }
-    let rows = sqlx::query(select::<AuditRow>("order by id")).fetch_all(&mut *connection).await?;
-    let mut transaction = connection.begin().await?;
+    let rows = sql(select::<AuditRow>("order by id")).fetch_all(&mut *connection).await?;
+    if rows.is_empty() {
+        return Ok(());
+    }
+    sql("begin").execute(&mut *connection).await?;
     let mut before = BEGINNING;
     for row in rows {
         let row = AuditRow::read(&row)?;
         before = link(&before, &row);
         let tie = AuditLinkRow { audit: row.id, hash: before.to_vec() };
-        tie.bind(sqlx::query(AuditLinkRow::INSERT)).execute(&mut *transaction).await?;
+        tie.bind(sql(AuditLinkRow::INSERT)).execute(&mut *connection).await?;
     }
-    Ok(transaction.commit().await?)
+    sql("commit").execute(connection).await?;
+    Ok(())
 }
 
 /// Looks at the whole chain in this data folder, beside a server that may be running, and changes nothing. `noted` are
@@ -152,18 +153,14 @@ pub async fn verify_audit(folder: &Path, noted: &[AuditHead]) -> Result<AuditVer
     let (mut last, mut before) = (0_i64, BEGINNING);
     let mut met = vec![false; heads.len()];
     while let Some(row) = rows.try_next().await? {
-        let id: i64 = sqlx::Row::try_get(&row, "id")?;
-        let is_next = id == last + 1
-            || (id >> CHAIN_SHIFT != last >> CHAIN_SHIFT && id & ((1 << CHAIN_SHIFT) - 1) == 1);
-        if !is_next {
+        let row = DbRow::from(row);
+        let id: i64 = row.try_get("id")?;
+        if id != last + 1 {
             verdict.found(format!("row {} is missing: after row {last} comes row {id}", last + 1));
-        }
-        if id >> CHAIN_SHIFT != last >> CHAIN_SHIFT {
-            before = BEGINNING;
         }
         verdict.rows += 1;
         last = id;
-        let tied: Option<Vec<u8>> = sqlx::Row::try_get(&row, "link")?;
+        let tied: Option<Vec<u8>> = row.try_get("link")?;
         let tied = tied.and_then(|hash| <[u8; 32]>::try_from(hash).ok());
         let expected = match AuditRow::read(&row) {
             Ok(row) => Some(link(&before, &row)),
@@ -199,10 +196,9 @@ pub async fn verify_audit(folder: &Path, noted: &[AuditHead]) -> Result<AuditVer
             verdict.found(format!("{name} ends at row {}, which is not there: rows were cut off", head.row));
         }
     }
-    let ties: i64 =
-        sqlx::query_scalar("select count(*) from audit_links where audit not in (select id from audit)")
-            .fetch_one(&mut connection)
-            .await?;
+    let ties: i64 = sql("select count(*) from audit_links where audit not in (select id from audit)")
+        .scalar(&mut connection)
+        .await?;
     if ties > 0 {
         verdict.found(format!("{ties} links have lost their row: rows were cut off"));
     }
@@ -216,7 +212,7 @@ pub async fn verify_audit(folder: &Path, noted: &[AuditHead]) -> Result<AuditVer
 /// As [`verify_audit`]; a row that is not what was written is an error here.
 pub async fn read_audit(folder: &Path, limit: u32) -> Result<Vec<AuditRow>, StoreError> {
     let mut connection = reading(folder).await?;
-    let rows = sqlx::query(select::<AuditRow>("order by id desc limit ?"))
+    let rows = sql(select::<AuditRow>("order by id desc limit ?"))
         .bind(i64::from(limit))
         .fetch_all(&mut connection)
         .await?;
@@ -230,7 +226,7 @@ async fn reading(folder: &Path) -> Result<SqliteConnection, StoreError> {
         let missing = io::Error::new(io::ErrorKind::NotFound, "there is no database in this folder");
         return Err(StoreError::from_io(&path, missing));
     }
-    Ok(SqliteConnection::connect_with(&open::reader_of(folder)).await?)
+    Ok(SqliteConnection::connect_with(&lite::reader_of(folder)).await?)
 }
 
 /// The file with the newest head. It is written after the commit, off the loop, and may lag behind by a row when the

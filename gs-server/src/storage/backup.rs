@@ -6,7 +6,8 @@ use std::time::Duration;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{Connection as _, SqliteConnection};
 
-use super::open::schema_crc;
+use super::db::sql;
+use super::lite::schema_crc;
 use super::row::{Row as _, select};
 use super::rows::MetaRow;
 use super::{DATABASE, StoreError};
@@ -51,7 +52,7 @@ pub async fn examine_database(file: &Path) -> Result<DatabaseFacts, StoreError> 
     let options = SqliteConnectOptions::new().filename(file).read_only(true).immutable(true);
     let mut connection = SqliteConnection::connect_with(&options).await?;
     let facts = facts(&mut connection).await?;
-    let finding: String = sqlx::query_scalar("pragma quick_check(1)").fetch_one(&mut connection).await?;
+    let finding: String = sql("pragma quick_check(1)").scalar(&mut connection).await?;
     if finding != "ok" {
         return Err(StoreError::damaged(finding.trim().replace('\n', "; ")));
     }
@@ -60,18 +61,13 @@ pub async fn examine_database(file: &Path) -> Result<DatabaseFacts, StoreError> 
 }
 
 pub(super) async fn facts(connection: &mut SqliteConnection) -> Result<DatabaseFacts, StoreError> {
-    let meta = sqlx::query(select::<MetaRow>("where id = 1")).fetch_one(&mut *connection).await?;
+    let meta = sql(select::<MetaRow>("where id = 1")).fetch_one(&mut *connection).await?;
     let meta = MetaRow::read(&meta)?;
     if meta.schema_crc != schema_crc(connection).await? {
         return Err(StoreError::damaged("its tables are not those that this program made"));
     }
-    let schema = sqlx::query_scalar("select max(version) from _sqlx_migrations").fetch_one(&mut *connection);
-    let schema = schema.await?;
-    let last_event =
-        sqlx::query_scalar("select coalesce(max(seq), 0) from events").fetch_one(&mut *connection);
-    let last_event = last_event.await?;
-    let last_frame =
-        sqlx::query_scalar("select coalesce(max(id), 0) from frames").fetch_one(&mut *connection);
-    let last_frame = last_frame.await?;
+    let schema = sql("select max(version) from _sqlx_migrations").scalar(&mut *connection).await?;
+    let last_event = sql("select coalesce(max(seq), 0) from events").scalar(&mut *connection).await?;
+    let last_frame = sql("select coalesce(max(id), 0) from frames").scalar(&mut *connection).await?;
     Ok(DatabaseFacts { station: meta.station, simulated: meta.simulated, schema, last_event, last_frame })
 }

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use sqlx::postgres::PgDatabaseError;
+
 /// Why storage did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
@@ -74,9 +76,58 @@ pub enum StoreError {
         /// The number.
         value: u64,
     },
+    /// The database is elsewhere and does not answer, or went away in the middle.
+    #[error("the database does not answer: look at its server and the network; it goes on by itself")]
+    Away {
+        /// What was noticed.
+        #[source]
+        source: io::Error,
+    },
+    /// The file with the password for the database.
+    #[error("the password for the database cannot be taken from {}: {problem}", path.display())]
+    PasswordFile {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with it, and what to do.
+        problem: &'static str,
+    },
+    /// Another server works as this station on the same database.
+    #[error(
+        "another server works as this station on the same database: stop that one, or give this one another station.name"
+    )]
+    StationTaken,
+    /// Another server holds the lease of a key.
+    #[error("key {key} is used by station {station} until {}", utc(*.until_us))]
+    Leased {
+        /// The id of the key.
+        key: String,
+        /// Who holds it.
+        station: String,
+        /// Until then, microseconds since 1970 UTC, unless it is renewed.
+        until_us: i64,
+    },
+    /// Another server works on the same intent.
+    #[error("another server works on this request: ask again with the same idempotency key")]
+    Claimed,
+    /// Another server took this station over.
+    #[error("another server has taken this station over: this one stores nothing any more; stop it")]
+    Replaced,
+    /// The database is set so that what was acknowledged may be lost.
+    #[error("the database runs with {setting} = {value}: set it to on, or what was acknowledged may be lost")]
+    Unsafe {
+        /// Which setting.
+        setting: &'static str,
+        /// What it is.
+        value: String,
+    },
     /// Anything else that the database says.
     #[error("the database refused")]
     Database(#[source] sqlx::Error),
+}
+
+pub(crate) fn utc(at_us: i64) -> String {
+    jiff::Timestamp::from_microsecond(at_us)
+        .map_or_else(|_| "an unknown time".to_owned(), |at| format!("{at:.0}"))
 }
 
 fn process(holder: Option<u32>) -> String {
@@ -86,7 +137,7 @@ fn process(holder: Option<u32>) -> String {
 impl StoreError {
     /// Whether the same call may succeed later, without anybody changing what is asked.
     pub fn is_temporary(&self) -> bool {
-        matches!(self, Self::Full | Self::Io { .. })
+        matches!(self, Self::Full | Self::Io { .. } | Self::Away { .. } | Self::Leased { .. } | Self::Claimed)
     }
 
     /// An error of the file system, for this path.
@@ -98,6 +149,11 @@ impl StoreError {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full,
             _ => Self::Io { what: path.display().to_string(), source },
         }
+    }
+
+    /// The database does not answer.
+    pub(crate) fn away(found: impl Into<String>) -> Self {
+        Self::Away { source: io::Error::other(found.into()) }
     }
 
     pub(crate) fn damaged(found: impl Into<String>) -> Self {
@@ -120,6 +176,11 @@ mod code {
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         match &error {
+            sqlx::Error::Database(inner) if inner.try_downcast_ref::<PgDatabaseError>().is_some() => {
+                let (code, text) =
+                    (inner.code().unwrap_or_default().into_owned(), inner.message().to_owned());
+                of_postgres(&code, &text, error)
+            }
             sqlx::Error::Database(inner) => {
                 let extended: i32 = inner.code().and_then(|code| code.parse().ok()).unwrap_or(0);
                 let text = inner.message().to_owned();
@@ -137,9 +198,35 @@ impl From<sqlx::Error> for StoreError {
                     _ => Self::Database(error),
                 }
             }
+            sqlx::Error::Io(_)
+            | sqlx::Error::Tls(_)
+            | sqlx::Error::Protocol(_)
+            | sqlx::Error::PoolTimedOut => Self::Away { source: io::Error::other(error) },
             // A value of another type than its column may hold: nobody could have written that.
             sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_) => Self::damaged(error.to_string()),
             _ => Self::Database(error),
         }
+    }
+}
+
+/// By the classes of <https://www.postgresql.org/docs/current/errcodes-appendix.html>.
+fn of_postgres(code: &str, text: &str, error: sqlx::Error) -> StoreError {
+    let io = || StoreError::Io {
+        what: "the database".into(),
+        source: io::Error::other(format!("{text} (code {code})")),
+    };
+    match code {
+        "53100" => StoreError::Full,
+        "58030" => io(),
+        "XX001" | "XX002" => StoreError::damaged(text),
+        "42501" | "28000" | "28P01" => StoreError::Permission { path: "the database".into() },
+        // Too many connections, out of memory, shutting down, starting up, a statement or a wait that took too long.
+        "57014" | "55P03" | "25P03" | "25006" => StoreError::away(text),
+        _ => match code.get(..2).unwrap_or_default() {
+            "08" | "53" | "57" | "40" => StoreError::away(text),
+            // A condition that a row breaks, and what our triggers refuse.
+            "23" | "P0" => StoreError::Conflict(text.to_owned()),
+            _ => StoreError::Database(error),
+        },
     }
 }

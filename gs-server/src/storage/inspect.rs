@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use protocol::{Counter, KeyId};
 use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{Connection as _, Row as _, SqliteConnection};
+use sqlx::{Connection as _, SqliteConnection};
 
 use super::backup::{DatabaseFacts, facts};
 use super::convert::narrow;
+use super::db::sql;
 use super::row::{Row, select};
 use super::rows::{CommandRow, EventRow, FrameRow, SealedRow, StageRow};
 use super::{DATABASE, StoreError};
@@ -47,7 +48,7 @@ pub async fn inspect_database(folder: &Path) -> Result<Inspection, StoreError> {
 
 async fn inspect(connection: &mut SqliteConnection) -> Result<Inspection, StoreError> {
     let facts = facts(connection).await?;
-    let finding: String = sqlx::query_scalar("pragma quick_check(1)").fetch_one(&mut *connection).await?;
+    let finding: String = sql("pragma quick_check(1)").scalar(&mut *connection).await?;
     if finding != "ok" {
         return Err(StoreError::damaged(finding.trim().replace('\n', "; ")));
     }
@@ -56,28 +57,26 @@ async fn inspect(connection: &mut SqliteConnection) -> Result<Inspection, StoreE
         + newest::<CommandRow>(connection, "order by id desc limit 500").await?
         + newest::<StageRow>(connection, "order by command desc limit 500").await?
         + newest::<EventRow>(connection, "order by seq desc limit 500").await?;
-    let rows = sqlx::query(
-        "select key, max(counter) as counter from (
+    let rows = sql("select key, max(counter) as counter from (
            select key, counter from sealed_frames union all select key, counter from counter_floors)
-         group by key",
-    );
+         group by key");
     let mut counters = BTreeMap::new();
     for row in rows.fetch_all(&mut *connection).await? {
         let key: String = row.try_get("key")?;
         key.parse::<KeyId>().map_err(|error| StoreError::damaged(format!("a key is '{key}': {error}")))?;
         counters.insert(key, Counter(narrow("counter", row.try_get("counter")?)?));
     }
-    let rows = sqlx::query("select satellite, max(epoch_us) as epoch_us from elements group by satellite");
+    let rows = sql("select satellite, max(epoch_us) as epoch_us from elements group by satellite");
     let mut epochs_us = BTreeMap::new();
     for row in rows.fetch_all(&mut *connection).await? {
         epochs_us.insert(row.try_get("satellite")?, row.try_get("epoch_us")?);
     }
-    let sqlite = sqlx::query_scalar("select sqlite_version()").fetch_one(connection).await?;
+    let sqlite = sql("select sqlite_version()").scalar(connection).await?;
     Ok(Inspection { facts, counters, epochs_us, rows_checked, sqlite })
 }
 
 async fn newest<R: Row>(connection: &mut SqliteConnection, which: &'static str) -> Result<usize, StoreError> {
-    let rows = sqlx::query(select::<R>(which)).fetch_all(connection).await?;
+    let rows = sql(select::<R>(which)).fetch_all(connection).await?;
     rows.iter().try_for_each(|row| R::read(row).map(drop))?;
     Ok(rows.len())
 }

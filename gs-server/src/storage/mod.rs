@@ -1,11 +1,12 @@
-//! The station's memory: one SQLite file in the data folder, and what stands beside it.
+//! The station's memory: one SQLite file in the data folder, or a PostgreSQL that several stations share, and what stands
+//! beside it.
 //!
 //! [`Store`] takes the engine's batches ([`Store::apply`]: whole or not at all, durable when it returns), gives back
 //! what a restart needs ([`Store::snapshot`]) and answers questions (`frames`, `telemetry`, `commands`, `images`,
 //! `events` …). Times come in with the records; storage reads no clock and decides nothing.
 //!
 //! The folder holds
-//! - `ground.sqlite3` with its `-wal` and `-shm`: the database;
+//! - `ground.sqlite3` with its `-wal` and `-shm`: the database, unless it is a PostgreSQL elsewhere;
 //! - `lock`: held while a server works here;
 //! - `reserve.bin`: raw frames while the database takes nothing, see [`reserve`];
 //! - `audit-head`: where the chain of the audit ends, see [`verify_audit`];
@@ -18,11 +19,14 @@ mod backup;
 mod convert;
 mod convert_plan;
 mod convert_sky;
+mod db;
 mod error;
 mod inspect;
+mod lite;
 mod lock;
 mod open;
 mod people;
+mod pg;
 mod progress;
 mod read;
 mod redecode;
@@ -43,16 +47,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use mission::port::ReservedFrame;
 use mission::{Batch, Principal, SatelliteId, Snapshot, StationId};
 use protocol::{Counter, KeyId};
-use sqlx::sqlite::SqlitePool;
 
 use crate::witness::WitnessFolder;
 
 pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
 pub use backup::{DatabaseFacts, copy_database, examine_database};
 pub use error::StoreError;
+pub(crate) use error::utc;
 pub use inspect::{Inspection, inspect_database};
 pub(crate) use people::PeopleChange;
 pub use people::{ApprovalRow, LinkRow, SessionRow, StationLicenceRow, TokenRow, TransmissionRow, UserRow};
+pub use pg::{Leased, Others, Postgres};
 pub use read::{
     Bucket, ChunkState, CommandLife, CommandNow, CommandQuery, Counts, EventQuery, FrameQuery, Heard,
     HeardCounts, ImageBytes, ImageMap, LatestValue, Page, Sample, Samples, Scope, Series, TelemetryQuery,
@@ -79,7 +84,9 @@ pub struct StoreOptions {
     pub station: Option<StationId>,
     /// Whether what is stored here is made up. The folder is marked at its birth; a mismatch is refused.
     pub simulated: bool,
-    /// The largest size of the database in pages of 4096 bytes; `None` for SQLite's own limit.
+    /// A PostgreSQL instead of the file in the folder.
+    pub postgres: Option<Postgres>,
+    /// The largest size of the file in pages of 4096 bytes; `None` for SQLite's own limit.
     pub max_page_count: Option<u32>,
     /// Size of the reserve for raw frames in bytes, allocated at once; 0 for none.
     pub reserve_bytes: u64,
@@ -92,8 +99,10 @@ pub struct Store(Arc<Inner>);
 struct Inner {
     folder: PathBuf,
     simulated: bool,
+    /// The station's number in a database that several share; 0 in a file of its own.
+    number: i64,
     writer: tokio::sync::Mutex<write::Writer>,
-    readers: SqlitePool,
+    readers: db::Pool,
     witness: WitnessFolder,
     reserve: Mutex<Option<Reserve>>,
     audit_head: Arc<audit_chain::HeadFile>,
@@ -141,7 +150,15 @@ impl Store {
     /// [`StoreError::Full`] and [`StoreError::Io`] may pass: the next batch is tried afresh. [`StoreError::Conflict`]
     /// when the records contradict what is stored. Nothing of the batch is stored then.
     pub async fn apply(&self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
-        let (events, head) = self.0.writer.lock().await.apply(batch).await?;
+        let mut writer = self.0.writer.lock().await;
+        let stored = if writer.is_shared() {
+            // A database elsewhere may never answer; the same batch is recognised when it comes again.
+            let apply = crate::clock::within(pg::APPLY, writer.apply(batch));
+            apply.await.unwrap_or_else(|| Err(StoreError::away("no answer within 20 s")))
+        } else {
+            writer.apply(batch).await
+        };
+        let (events, head) = stored?;
         if let Some(head) = head {
             // Nobody waits for it: the chain itself is in the database.
             let file = Arc::clone(&self.0.audit_head);
@@ -170,6 +187,36 @@ impl Store {
         read::find_intent(self, principal, idempotency_key).await
     }
 
+    /// As [`Store::find_intent`]; where there is none, this server takes the intent for itself before others that share
+    /// the database can.
+    ///
+    /// # Errors
+    /// [`StoreError::Claimed`] when another server works on it.
+    pub async fn find_or_claim_intent(
+        &self,
+        principal: &Principal,
+        idempotency_key: &str,
+    ) -> Result<Option<StoredIntent>, StoreError> {
+        let found = read::find_intent(self, principal, idempotency_key).await?;
+        if found.is_some() || !self.is_shared() {
+            return Ok(found);
+        }
+        match crate::clock::within(pg::APPLY, self.claim(principal, idempotency_key)).await {
+            // What was not there before the claim may have come before it.
+            Some(Ok(())) => read::find_intent(self, principal, idempotency_key).await,
+            Some(Err(error)) => Err(error),
+            None => Err(StoreError::away("no answer within 20 s")),
+        }
+    }
+
+    async fn claim(&self, principal: &Principal, idempotency_key: &str) -> Result<(), StoreError> {
+        let mut writer = self.0.writer.lock().await;
+        let Some(fence) = writer.fence() else { return Ok(()) };
+        let mut connection = writer.begin().await?;
+        let claimed = fence.claim(&mut connection, principal.as_str(), idempotency_key).await;
+        if writer.end(connection, claimed).await? { Ok(()) } else { Err(StoreError::Claimed) }
+    }
+
     /// Makes the derived rows again from the raw frames, and compares everything on the way.
     ///
     /// One transaction for some hundred frames; when it is broken off, the next call goes on where this one was.
@@ -187,6 +234,11 @@ impl Store {
     /// The data folder.
     pub fn folder(&self) -> &Path {
         &self.0.folder
+    }
+
+    /// Whether the database is one that several servers share.
+    pub fn is_shared(&self) -> bool {
+        matches!(self.0.readers, db::Pool::Pg(_))
     }
 
     /// Whether what is stored here is made up.

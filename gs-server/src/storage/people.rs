@@ -3,8 +3,9 @@
 //! Nothing secret is stored: hashes only. Every change of people is one transaction with its audit rows.
 
 use mission::record::AuditRecord;
-use sqlx::{AssertSqlSafe, Row as _};
+use sqlx::AssertSqlSafe;
 
+use super::db::sql;
 use super::row::{Row, row, select};
 use super::rows::StageRow;
 use super::write::Transaction;
@@ -231,13 +232,13 @@ impl Store {
 
     /// All users by name.
     pub(crate) async fn users(&self) -> Result<Vec<UserRow>, StoreError> {
-        let rows = sqlx::query(select::<UserRow>("order by name")).fetch_all(&self.0.readers).await?;
+        let rows = sql(select::<UserRow>("order by name")).fetch_all(&self.0.readers).await?;
         rows.iter().map(UserRow::read).collect()
     }
 
     /// Whether there is any user.
     pub(crate) async fn has_users(&self) -> Result<bool, StoreError> {
-        let count: i64 = sqlx::query_scalar("select count(*) from users").fetch_one(&self.0.readers).await?;
+        let count: i64 = sql("select count(*) from users").scalar(&self.0.readers).await?;
         Ok(count > 0)
     }
 
@@ -260,17 +261,16 @@ impl Store {
 
     /// Those of a user that were not ended.
     pub(crate) async fn sessions_of(&self, user: &str) -> Result<Vec<SessionRow>, StoreError> {
-        let rows = sqlx::query(select::<SessionRow>(
-            "where user_name = $1 and ended_at_us is null order by created_at_us",
-        ))
-        .bind(user)
-        .fetch_all(&self.0.readers)
-        .await?;
+        let rows =
+            sql(select::<SessionRow>("where user_name = $1 and ended_at_us is null order by created_at_us"))
+                .bind(user)
+                .fetch_all(&self.0.readers)
+                .await?;
         rows.iter().map(SessionRow::read).collect()
     }
 
     pub(crate) async fn tokens(&self) -> Result<Vec<TokenRow>, StoreError> {
-        let rows = sqlx::query(select::<TokenRow>("order by name")).fetch_all(&self.0.readers).await?;
+        let rows = sql(select::<TokenRow>("order by name")).fetch_all(&self.0.readers).await?;
         rows.iter().map(TokenRow::read).collect()
     }
 
@@ -283,10 +283,8 @@ impl Store {
     }
 
     pub(crate) async fn approval(&self, id: i64) -> Result<Option<ApprovalRow>, StoreError> {
-        let row = sqlx::query(select::<ApprovalRow>("where id = $1"))
-            .bind(id)
-            .fetch_optional(&self.0.readers)
-            .await?;
+        let row =
+            sql(select::<ApprovalRow>("where id = $1")).bind(id).fetch_optional(&self.0.readers).await?;
         row.as_ref().map(ApprovalRow::read).transpose()
     }
 
@@ -296,7 +294,7 @@ impl Store {
         principal: &str,
         idempotency_key: &str,
     ) -> Result<Option<ApprovalRow>, StoreError> {
-        let row = sqlx::query(select::<ApprovalRow>("where principal = $1 and idempotency_key = $2"))
+        let row = sql(select::<ApprovalRow>("where principal = $1 and idempotency_key = $2"))
             .bind(principal)
             .bind(idempotency_key)
             .fetch_optional(&self.0.readers)
@@ -334,12 +332,12 @@ impl Store {
     }
 
     async fn by_text<R: Row>(&self, condition: &'static str, text: &str) -> Result<Option<R>, StoreError> {
-        let row = sqlx::query(select::<R>(condition)).bind(text).fetch_optional(&self.0.readers).await?;
+        let row = sql(select::<R>(condition)).bind(text).fetch_optional(&self.0.readers).await?;
         row.as_ref().map(R::read).transpose()
     }
 
     async fn by_bytes<R: Row>(&self, condition: &'static str, bytes: &[u8]) -> Result<Option<R>, StoreError> {
-        let row = sqlx::query(select::<R>(condition)).bind(bytes).fetch_optional(&self.0.readers).await?;
+        let row = sql(select::<R>(condition)).bind(bytes).fetch_optional(&self.0.readers).await?;
         row.as_ref().map(R::read).transpose()
     }
 }
@@ -354,17 +352,17 @@ impl Transaction<'_> {
             }
             PeopleChange::UseLink(link) => {
                 let done =
-                    sqlx::query("update user_links set used_at_us = $1, crc = $2 where code_hash = $3 and used_at_us is null")
+                    sql("update user_links set used_at_us = $1, crc = $2 where code_hash = $3 and used_at_us is null")
                         .bind(link.used_at_us)
                         .bind(link.crc())
                         .bind(&link.code_hash)
                         .execute(&mut *self.connection)
                         .await?;
-                settled(done.rows_affected(), "the link was used")
+                settled(done, "the link was used")
             }
             PeopleChange::Session(session) => self.upsert("id", session).await,
             PeopleChange::EndSessions { user, at_us, why } => {
-                let found = sqlx::query(select::<SessionRow>("where user_name = $1 and ended_at_us is null"))
+                let found = sql(select::<SessionRow>("where user_name = $1 and ended_at_us is null"))
                     .bind(user)
                     .fetch_all(&mut *self.connection)
                     .await?;
@@ -380,13 +378,12 @@ impl Transaction<'_> {
             }
             PeopleChange::Token(token) => self.upsert("name", token).await,
             PeopleChange::NewApproval(approval) => {
-                let last: i64 = sqlx::query_scalar("select coalesce(max(id), 0) from approvals")
-                    .fetch_one(&mut *self.connection)
-                    .await?;
+                let last: i64 =
+                    sql("select coalesce(max(id), 0) from approvals").scalar(&mut *self.connection).await?;
                 self.insert(&ApprovalRow { id: last + 1, ..approval.clone() }).await
             }
             PeopleChange::Decide(approval) => {
-                let done = sqlx::query(
+                let done = sql(
                     "update approvals set state = $1, decided_by = $2, decided_at_us = $3, why = $4, crc = $5
                      where id = $6 and state = 'awaiting'",
                 )
@@ -398,7 +395,7 @@ impl Transaction<'_> {
                 .bind(approval.id)
                 .execute(&mut *self.connection)
                 .await?;
-                settled(done.rows_affected(), "it was decided")
+                settled(done, "it was decided")
             }
             PeopleChange::Released(approval) => self.upsert("id", approval).await,
             PeopleChange::StationLicence(licence) => self.upsert("station", licence).await,
@@ -407,11 +404,10 @@ impl Transaction<'_> {
 
     /// Links that were made before open nothing any more.
     async fn spend_links(&mut self, user: Option<&str>, at_us: i64) -> Result<(), StoreError> {
-        let found =
-            sqlx::query(select::<LinkRow>("where coalesce(user_name, '') = $1 and used_at_us is null"))
-                .bind(user.unwrap_or(""))
-                .fetch_all(&mut *self.connection)
-                .await?;
+        let found = sql(select::<LinkRow>("where coalesce(user_name, '') = $1 and used_at_us is null"))
+            .bind(user.unwrap_or(""))
+            .fetch_all(&mut *self.connection)
+            .await?;
         for row in &found {
             let row = LinkRow { used_at_us: Some(at_us), ..LinkRow::read(row)? };
             self.upsert("code_hash", &row).await?;
@@ -421,12 +417,12 @@ impl Transaction<'_> {
 
     /// Who answers for this radiation, beside the permission to radiate: in the same transaction.
     pub(super) async fn responsible(&mut self, stage: &StageRow) -> Result<(), StoreError> {
-        let principal: String = sqlx::query_scalar("select principal from commands where id = $1")
+        let principal: String = sql("select principal from commands where id = $1")
             .bind(stage.command)
-            .fetch_one(&mut *self.connection)
+            .scalar(&mut *self.connection)
             .await?;
         let person = self.person_behind(&principal).await?;
-        let station = sqlx::query(select::<StationLicenceRow>("where station = $1"))
+        let station = sql(select::<StationLicenceRow>("where station = $1"))
             .bind(&stage.station)
             .fetch_optional(&mut *self.connection)
             .await?;
@@ -451,7 +447,7 @@ impl Transaction<'_> {
         };
         // A radiation is never held up by its own record.
         let insert = AssertSqlSafe(format!("{} on conflict do nothing", TransmissionRow::INSERT));
-        row.bind(sqlx::query(insert)).execute(&mut *self.connection).await?;
+        row.bind(sql(insert)).execute(&mut *self.connection).await?;
         Ok(())
     }
 
@@ -459,28 +455,28 @@ impl Transaction<'_> {
     async fn person_behind(&mut self, principal: &str) -> Result<Option<UserRow>, StoreError> {
         let armed_by = match principal.strip_prefix("plan:") {
             Some(plan) => {
-                let found = sqlx::query(
+                let found = sql(
                     "select who from audit where action = 'plan.arm' and detail = $1 order by id desc limit 1",
                 )
                 .bind(format!("plan {plan}"))
                 .fetch_optional(&mut *self.connection)
                 .await?;
-                found.map(|row| row.try_get::<String, _>("who")).transpose()?
+                found.map(|row| row.try_get::<String>("who")).transpose()?
             }
             None => Some(principal.to_owned()),
         };
         let Some(who) = armed_by else { return Ok(None) };
         let name = match who.strip_prefix("token:") {
-            Some(token) => sqlx::query_scalar("select owner from tokens where name = $1")
+            Some(token) => sql("select owner from tokens where name = $1")
                 .bind(token)
-                .fetch_optional(&mut *self.connection)
+                .scalar_optional::<Option<String>>(&mut *self.connection)
                 .await?
                 .flatten(),
             None => Some(who),
         };
         let Some(name) = name else { return Ok(None) };
-        let row = sqlx::query(select::<UserRow>("where name = $1"))
-            .bind::<String>(name)
+        let row = sql(select::<UserRow>("where name = $1"))
+            .bind(name)
             .fetch_optional(&mut *self.connection)
             .await?;
         row.as_ref().map(UserRow::read).transpose()

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use futures_util::TryStreamExt as _;
 use mission::record::DECODER_VERSION;
 use protocol::DownFrame;
-use sqlx::Row as _;
 
+use super::db::sql;
 use super::row::{Row, select};
 use super::rows::{
     AuditLinkRow, AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow,
@@ -66,8 +66,7 @@ pub(super) async fn redecode(
     mut progress: impl FnMut(RedecodeProgress) + Send,
 ) -> Result<RedecodeReport, StoreError> {
     let mut report = RedecodeReport::default();
-    let last_frame: i64 =
-        sqlx::query_scalar("select coalesce(max(id), 0) from frames").fetch_one(&store.0.readers).await?;
+    let last_frame: i64 = sql("select coalesce(max(id), 0) from frames").scalar(&store.0.readers).await?;
     loop {
         let mut writer = store.0.writer.lock().await;
         let mut connection = writer.begin().await?;
@@ -89,15 +88,15 @@ async fn step(
     report: &mut RedecodeReport,
 ) -> Result<Option<i64>, StoreError> {
     let version = i64::from(DECODER_VERSION);
-    sqlx::query("delete from redecode where decoder_version <> ?")
+    sql("delete from redecode where decoder_version <> ?")
         .bind(version)
         .execute(&mut *transaction.connection)
         .await?;
-    let from: Option<i64> = sqlx::query_scalar("select last_frame from redecode where decoder_version = ?")
+    let from: Option<i64> = sql("select last_frame from redecode where decoder_version = ?")
         .bind(version)
-        .fetch_optional(&mut *transaction.connection)
+        .scalar_optional(&mut *transaction.connection)
         .await?;
-    let rows = sqlx::query(select::<FrameRow>("where id > ? order by id limit ?"))
+    let rows = sql(select::<FrameRow>("where id > ? order by id limit ?"))
         .bind(from.unwrap_or(0))
         .bind(FRAMES_PER_STEP)
         .fetch_all(&mut *transaction.connection)
@@ -115,10 +114,8 @@ async fn step(
             Err(error) => return Err(error),
         }
     }
-    sqlx::query(
-        "insert into redecode (decoder_version, last_frame) values (?, ?)
-         on conflict (decoder_version) do update set last_frame = excluded.last_frame",
-    )
+    sql("insert into redecode (decoder_version, last_frame) values (?, ?)
+         on conflict (decoder_version) do update set last_frame = excluded.last_frame")
     .bind(version)
     .bind(last)
     .execute(&mut *transaction.connection)
@@ -157,7 +154,7 @@ async fn remake(
         wanted.insert(parameter, row);
     }
 
-    let present = sqlx::query(select::<TelemetryRow>(
+    let present = sql(select::<TelemetryRow>(
         "where parameter in (select id from parameters where satellite = ?) and at_us = ? and frame = ?",
     ))
     .bind(&frame.satellite)
@@ -184,7 +181,7 @@ async fn remake(
             Some(_) => changed += 1,
             None => {
                 report.removed += 1;
-                sqlx::query("delete from telemetry where parameter = ? and at_us = ? and frame = ?")
+                sql("delete from telemetry where parameter = ? and at_us = ? and frame = ?")
                     .bind(parameter)
                     .bind(frame.heard_at_us)
                     .bind(frame.id)
@@ -201,14 +198,12 @@ async fn remake(
 
 /// Values that belong to no frame, or to another time than their frame.
 async fn finish(transaction: &mut Transaction<'_>, report: &mut RedecodeReport) -> Result<(), StoreError> {
-    let orphans = sqlx::query(
-        "delete from telemetry where not exists (
-           select 1 from frames where frames.id = telemetry.frame and frames.heard_at_us = telemetry.at_us)",
-    )
+    let orphans = sql("delete from telemetry where not exists (
+           select 1 from frames where frames.id = telemetry.frame and frames.heard_at_us = telemetry.at_us)")
     .execute(&mut *transaction.connection)
     .await?;
-    report.removed += orphans.rows_affected();
-    sqlx::query("delete from redecode").execute(&mut *transaction.connection).await?;
+    report.removed += orphans;
+    sql("delete from redecode").execute(&mut *transaction.connection).await?;
     Ok(())
 }
 
@@ -238,7 +233,7 @@ async fn verify_the_rest(store: &Store, report: &mut RedecodeReport) -> Result<(
 }
 
 async fn verify<R: Row>(store: &Store, report: &mut RedecodeReport) -> Result<(), StoreError> {
-    let mut rows = sqlx::query(R::SELECT).fetch(&store.0.readers);
+    let mut rows = sql(R::SELECT).fetch(&store.0.readers);
     while let Some(row) = rows.try_next().await? {
         match R::read(&row) {
             Ok(_) => {}

@@ -1,5 +1,6 @@
 //! What may go: values derived from raw frames, which `redecode` makes again. Nothing else ever does.
 
+use super::db::sql;
 use super::{Store, StoreError};
 
 impl Store {
@@ -12,17 +13,13 @@ impl Store {
     pub async fn remove_telemetry(&self, before_us: i64, at_most: u32) -> Result<u64, StoreError> {
         let mut writer = self.0.writer.lock().await;
         let mut connection = writer.begin().await?;
-        let result = sqlx::query(
-            "delete from telemetry where (parameter, at_us, frame) in (
+        let result = sql("delete from telemetry where (parameter, at_us, frame) in (
                select t.parameter, t.at_us, t.frame from parameters p
-               join telemetry t on t.parameter = p.id and t.at_us < $1 limit $2)",
-        )
+               join telemetry t on t.parameter = p.id and t.at_us < $1 limit $2)")
         .bind(before_us)
         .bind(i64::from(at_most))
         .execute(&mut connection)
-        .await
-        .map(|done| done.rows_affected())
-        .map_err(StoreError::from);
+        .await;
         writer.end(connection, result).await
     }
 }

@@ -9,6 +9,7 @@ use std::fmt;
 use sqlx::AssertSqlSafe;
 
 use super::StoreError;
+use super::db::{DbRow, Query};
 
 /// Collects the values of one row.
 pub(super) struct Digest(Vec<u8>);
@@ -50,7 +51,7 @@ impl Feed for bool {
 
 impl Feed for f64 {
     fn feed(&self, digest: &mut Digest) {
-        // -0.0 is written as 0.0 by SQLite when it packs a REAL as an integer.
+        // -0.0 is written as 0.0 by SQLite when it packs a REAL as an integer; PostgreSQL keeps it.
         digest.put(2, &(self + 0.0).to_bits().to_le_bytes());
     }
 }
@@ -98,9 +99,9 @@ pub(super) trait Row: Sized + Send {
     /// The checksum of this row.
     fn crc(&self) -> i64;
     /// All columns and the checksum, in the order of [`Self::INSERT`].
-    fn bind<'q>(&'q self, query: Statement<'q>) -> Statement<'q>;
+    fn bind(&self, query: Query) -> Query;
     /// The row, when its checksum is right.
-    fn read(row: &sqlx::sqlite::SqliteRow) -> Result<Self, StoreError>;
+    fn read(row: &DbRow) -> Result<Self, StoreError>;
 }
 
 /// `select` with a condition written here; values are bound, never part of it.
@@ -149,17 +150,16 @@ macro_rules! row {
                 digest.finish()
             }
 
-            fn bind<'q>(&'q self, query: crate::storage::row::Statement<'q>) -> crate::storage::row::Statement<'q> {
+            fn bind(&self, query: crate::storage::db::Query) -> crate::storage::db::Query {
                 query.bind(&self.$first)$(.bind(&self.$field))*.bind(self.crc())
             }
 
-            fn read(row: &sqlx::sqlite::SqliteRow) -> Result<Self, crate::storage::StoreError> {
-                use sqlx::Row as _;
+            fn read(row: &crate::storage::db::DbRow) -> Result<Self, crate::storage::StoreError> {
                 let read = Self {
                     $first: row.try_get(stringify!($first))?,
                     $($field: row.try_get(stringify!($field))?,)*
                 };
-                match row.try_get::<i64, _>("crc")? == crate::storage::row::Row::crc(&read) {
+                match row.try_get::<i64>("crc")? == crate::storage::row::Row::crc(&read) {
                     true => Ok(read),
                     false => Err(crate::storage::row::wrong_row($table, &read.$first)),
                 }
@@ -169,6 +169,3 @@ macro_rules! row {
     (@ $text:literal $field:ident) => { $text };
 }
 pub(super) use row;
-
-/// A statement on its way to SQLite.
-pub(super) type Statement<'q> = sqlx::query::Query<'q, sqlx::Sqlite, sqlx::sqlite::SqliteArguments>;

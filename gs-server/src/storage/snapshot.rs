@@ -11,15 +11,18 @@ use mission::snapshot::{
 };
 use mission::{ElementSet, FrameId, SatelliteId, Stage, UtcUs};
 use protocol::{Counter, DownFrame, Downlink, KeyId, RequestTag, down_type};
-use sqlx::{Row as _, SqliteConnection};
 
 use super::convert::{exactly, int, narrow, parse};
+use super::db::{Reading, sql};
 use super::row::{Row as _, select};
 use super::rows::{
     ChunkRow, CommandRow, ConditionRow, DownloadRow, ElementsRow, FrameRow, ImageRow, LimitRow,
     PassElementsRow, PassRow, PlanRow, RunRow, SealedRow, StageRow,
 };
 use super::{Store, StoreError, off_the_loop};
+
+/// Bits of an id below the number of its station: with 13 bits above, ids stay whole in JSON (2^53).
+const STATION_SHIFT: u32 = 40;
 
 /// A command that is `unknown` may still be settled by telemetry for so long.
 const UNKNOWN_KEPT_US: i64 = 24 * 3600 * 1_000_000;
@@ -33,20 +36,33 @@ pub(super) async fn snapshot(
     keys: &[KeyId],
 ) -> Result<Snapshot, StoreError> {
     let mut transaction = store.0.readers.begin().await?;
-    let connection = &mut *transaction;
-    let mut snapshot = Snapshot { last_ids: last_ids(connection).await?, ..Snapshot::default() };
+    let connection = &mut transaction;
+    let own = Own::of(store.0.number);
+    let mut snapshot = Snapshot { last_ids: last_ids(connection, own).await?, ..Snapshot::default() };
     for satellite in satellites {
-        let left = of_satellite(connection, satellite).await?;
+        let left = of_satellite(connection, satellite, own).await?;
         if !is_empty(&left) {
             snapshot.satellites.push(left);
         }
     }
-    snapshot.plans = plans(connection).await?;
-    snapshot.runs = runs(connection).await?;
+    snapshot.plans = plans(connection, own).await?;
+    snapshot.runs = runs(connection, own).await?;
     let folder = store.0.witness.clone();
-    let asked = keys.to_vec();
-    let witnesses: Vec<Witness> =
-        off_the_loop(move || asked.into_iter().map(|key| folder.read(key)).collect()).await?;
+    let mut asked = Vec::with_capacity(keys.len());
+    for key in keys {
+        asked.push((*key, used_by_others(connection, store, *key).await?));
+    }
+    let witnesses: Vec<Witness> = off_the_loop(move || {
+        let read = |(key, used): (KeyId, Option<Counter>)| match (folder.read(key), used) {
+            (Witness::Missing, Some(used)) => match folder.raise(key, used) {
+                Ok(()) => folder.read(key),
+                Err(_) => Witness::Missing,
+            },
+            (found, _) => found,
+        };
+        asked.into_iter().map(read).collect()
+    })
+    .await?;
     for (key, witness) in keys.iter().zip(witnesses) {
         snapshot.keys.push(KeySnapshot { key: *key, counter: counter(connection, *key).await?, witness });
     }
@@ -64,17 +80,56 @@ fn is_empty(left: &SatelliteSnapshot) -> bool {
         && left.pass.is_none()
 }
 
-async fn last_ids(connection: &mut SqliteConnection) -> Result<LastIds, StoreError> {
-    let row = sqlx::query(
-        "select (select coalesce(max(id), 0) from frames) as frame,
-                (select coalesce(max(id), 0) from commands) as command,
-                (select coalesce(max(id), 0) from images) as image,
-                (select coalesce(max(id), 0) from downloads) as download,
-                (select coalesce(max(id), 0) from elements) as elements,
-                (select coalesce(max(id), 0) from passes) as pass,
-                (select coalesce(max(id), 0) from plans) as plan,
-                (select coalesce(max(id), 0) from plan_runs) as run",
-    )
+/// The ids that this station gives: an id holds the station's number in its upper bits, so that stations which share a
+/// database never give the same. What another station is doing is its own affair: a restart goes on with ours.
+#[derive(Debug, Clone, Copy)]
+struct Own {
+    /// Below the first.
+    after: i64,
+    /// Above the last.
+    before: i64,
+}
+
+impl Own {
+    const fn of(number: i64) -> Self {
+        Self { after: number << STATION_SHIFT, before: (number + 1) << STATION_SHIFT }
+    }
+}
+
+/// The counter of a key that other stations used and this one never did: there is nothing yet that a witness of ours
+/// could have seen and lost, so it begins here.
+async fn used_by_others(
+    connection: &mut Reading,
+    store: &Store,
+    key: KeyId,
+) -> Result<Option<Counter>, StoreError> {
+    if !store.is_shared() {
+        return Ok(None);
+    }
+    let own = Own::of(store.0.number);
+    let sealed_here: i64 =
+        sql("select count(*) from sealed_frames where key = ? and command > ? and command < ?")
+            .bind(key.to_string())
+            .bind(own.after)
+            .bind(own.before)
+            .scalar(&mut *connection)
+            .await?;
+    if sealed_here > 0 { Ok(None) } else { counter(connection, key).await }
+}
+
+/// The highest ids that this station gave.
+async fn last_ids(connection: &mut Reading, own: Own) -> Result<LastIds, StoreError> {
+    let row = sql("select
+           (select coalesce(max(id), ?1) from frames where id > ?1 and id < ?2) as frame,
+           (select coalesce(max(id), ?1) from commands where id > ?1 and id < ?2) as command,
+           (select coalesce(max(id), ?1) from images where id > ?1 and id < ?2) as image,
+           (select coalesce(max(id), ?1) from downloads where id > ?1 and id < ?2) as download,
+           (select coalesce(max(id), ?1) from elements where id > ?1 and id < ?2) as elements,
+           (select coalesce(max(id), ?1) from passes where id > ?1 and id < ?2) as pass,
+           (select coalesce(max(id), ?1) from plans where id > ?1 and id < ?2) as plan,
+           (select coalesce(max(id), ?1) from plan_runs where id > ?1 and id < ?2) as run")
+    .bind(own.after)
+    .bind(own.before)
     .fetch_one(connection)
     .await?;
     Ok(LastIds {
@@ -90,86 +145,91 @@ async fn last_ids(connection: &mut SqliteConnection) -> Result<LastIds, StoreErr
 }
 
 async fn of_satellite(
-    connection: &mut SqliteConnection,
+    connection: &mut Reading,
     satellite: &SatelliteId,
+    own: Own,
 ) -> Result<SatelliteSnapshot, StoreError> {
     Ok(SatelliteSnapshot {
         satellite: satellite.clone(),
         last_tag: last_tag(connection, satellite).await?,
-        commands: commands(connection, satellite).await?,
-        image: image(connection, satellite).await?,
+        commands: commands(connection, satellite, own).await?,
+        image: image(connection, satellite, own).await?,
         downloads: {
-            let rows =
-                sqlx::query(select::<DownloadRow>("where satellite = ? and state = 'active' order by id"))
-                    .bind(satellite.as_str())
-                    .fetch_all(&mut *connection)
-                    .await?;
+            let rows = sql(select::<DownloadRow>(
+                "where satellite = ? and state = 'active' and id > ? and id < ? order by id",
+            ))
+            .bind(satellite.as_str())
+            .bind(own.after)
+            .bind(own.before)
+            .fetch_all(&mut *connection)
+            .await?;
             rows.iter().map(|row| DownloadRow::read(row)?.record()).collect::<Result<_, _>>()?
         },
         limits: {
-            let rows = sqlx::query(select::<LimitRow>(
-                "where satellite = ? and level <> 'normal' order by parameter",
-            ))
-            .bind(satellite.as_str())
-            .fetch_all(&mut *connection)
-            .await?;
+            let rows =
+                sql(select::<LimitRow>("where satellite = ? and level <> 'normal' order by parameter"))
+                    .bind(satellite.as_str())
+                    .fetch_all(&mut *connection)
+                    .await?;
             rows.iter().map(|row| LimitRow::read(row)?.record()).collect::<Result<_, _>>()?
         },
-        heartbeat: heartbeat(connection, satellite).await?,
+        heartbeat: heartbeat(connection, satellite, own).await?,
         elements: elements(connection, satellite).await?,
-        pass: pass(connection, satellite).await?,
+        pass: pass(connection, satellite, own).await?,
     })
 }
 
-async fn plans(connection: &mut SqliteConnection) -> Result<Vec<PlanRecord>, StoreError> {
-    let rows = sqlx::query(select::<PlanRow>("where withdrawn_at_us is null order by id"))
+async fn plans(connection: &mut Reading, own: Own) -> Result<Vec<PlanRecord>, StoreError> {
+    let rows = sql(select::<PlanRow>("where withdrawn_at_us is null and id > ? and id < ? order by id"))
+        .bind(own.after)
+        .bind(own.before)
         .fetch_all(connection)
         .await?;
     rows.iter().map(|row| PlanRow::read(row)?.record()).collect()
 }
 
 /// What is not over, of each plan the newest if the next pass is to finish it, and of each satellite the newest that ended.
-async fn runs(connection: &mut SqliteConnection) -> Result<Vec<RunRecord>, StoreError> {
-    let rows = sqlx::query(select::<RunRow>(
-        "where state in ('planned', 'waiting', 'running', 'held')
-            or id in (select max(id) from plan_runs where state = 'ended' group by satellite)
+async fn runs(connection: &mut Reading, own: Own) -> Result<Vec<RunRecord>, StoreError> {
+    let rows = sql(select::<RunRow>(
+        "where id > ?1 and id < ?2 and (state in ('planned', 'waiting', 'running', 'held')
+            or id in (select max(id) from plan_runs where state = 'ended' and id > ?1 and id < ?2 group by satellite)
             or (outcome = 'later'
-                and id in (select max(id) from plan_runs where state = 'ended' group by plan))
+                and id in (select max(id) from plan_runs where state = 'ended' and id > ?1 and id < ?2 group by plan)))
          order by id",
     ))
+    .bind(own.after)
+    .bind(own.before)
     .fetch_all(connection)
     .await?;
     rows.iter().map(|row| RunRow::read(row)?.record()).collect()
 }
 
 /// The newest sets by epoch.
-async fn elements(
-    connection: &mut SqliteConnection,
-    satellite: &SatelliteId,
-) -> Result<Vec<ElementSet>, StoreError> {
-    let rows =
-        sqlx::query(select::<ElementsRow>("where satellite = ? order by epoch_us desc, id desc limit ?"))
-            .bind(satellite.as_str())
-            .bind(int("limit", SETS_KEPT as u64)?)
-            .fetch_all(connection)
-            .await?;
+async fn elements(connection: &mut Reading, satellite: &SatelliteId) -> Result<Vec<ElementSet>, StoreError> {
+    let rows = sql(select::<ElementsRow>("where satellite = ? order by epoch_us desc, id desc limit ?"))
+        .bind(satellite.as_str())
+        .bind(int("limit", SETS_KEPT as u64)?)
+        .fetch_all(connection)
+        .await?;
     rows.iter().map(|row| ElementsRow::read(row)?.set()).collect()
 }
 
 /// The newest pass, if it has not ended.
 async fn pass(
-    connection: &mut SqliteConnection,
+    connection: &mut Reading,
     satellite: &SatelliteId,
+    own: Own,
 ) -> Result<Option<PassRecord>, StoreError> {
-    let row = sqlx::query(select::<PassRow>(
-        "where satellite = ? and ended_at_us is null order by id desc limit 1",
-    ))
-    .bind(satellite.as_str())
-    .fetch_optional(&mut *connection)
-    .await?;
+    let open = "where satellite = ? and ended_at_us is null and id > ? and id < ? order by id desc limit 1";
+    let row = sql(select::<PassRow>(open))
+        .bind(satellite.as_str())
+        .bind(own.after)
+        .bind(own.before)
+        .fetch_optional(&mut *connection)
+        .await?;
     let Some(row) = row else { return Ok(None) };
     let pass = PassRow::read(&row)?;
-    let used = sqlx::query(select::<PassElementsRow>("where pass = ? order by id"))
+    let used = sql(select::<PassElementsRow>("where pass = ? order by id"))
         .bind(pass.id)
         .fetch_all(connection)
         .await?;
@@ -178,10 +238,10 @@ async fn pass(
 }
 
 async fn last_tag(
-    connection: &mut SqliteConnection,
+    connection: &mut Reading,
     satellite: &SatelliteId,
 ) -> Result<Option<RequestTag>, StoreError> {
-    let row = sqlx::query(select::<SealedRow>("where satellite = ? order by id desc limit 1"))
+    let row = sql(select::<SealedRow>("where satellite = ? order by id desc limit 1"))
         .bind(satellite.as_str())
         .fetch_optional(connection)
         .await?;
@@ -190,17 +250,19 @@ async fn last_tag(
 
 /// Commands whose last stage is not final, and fresh ones that are `unknown`.
 async fn commands(
-    connection: &mut SqliteConnection,
+    connection: &mut Reading,
     satellite: &SatelliteId,
+    own: Own,
 ) -> Result<Vec<CommandSnapshot>, StoreError> {
-    let newest_us: i64 = sqlx::query_scalar(
-        "select max(coalesce((select at_us from events order by seq desc limit 1), 0),
-                    coalesce((select at_us from command_stages order by id desc limit 1), 0))",
+    let newest_us: i64 = sql(
+        "select max(at_us) from (
+           select coalesce((select at_us from events order by seq desc limit 1), 0) as at_us
+           union all select coalesce((select at_us from command_stages order by id desc limit 1), 0)) as newest",
     )
-    .fetch_one(&mut *connection)
+    .scalar(&mut *connection)
     .await?;
-    let rows = sqlx::query(select::<CommandRow>(
-        "where satellite = ?1 and not exists (
+    let rows = sql(select::<CommandRow>(
+        "where satellite = ?1 and id > ?3 and id < ?4 and not exists (
            select 1 from command_stages as last
            where last.id = (select max(id) from command_stages where command = commands.id)
              and last.stage not in ('queued', 'sealed', 'radiating', 'radiated')
@@ -209,6 +271,8 @@ async fn commands(
     ))
     .bind(satellite.as_str())
     .bind(newest_us.saturating_sub(UNKNOWN_KEPT_US))
+    .bind(own.after)
+    .bind(own.before)
     .fetch_all(&mut *connection)
     .await?;
     let mut commands = Vec::with_capacity(rows.len());
@@ -218,13 +282,13 @@ async fn commands(
     Ok(commands)
 }
 
-async fn command(connection: &mut SqliteConnection, row: &CommandRow) -> Result<CommandSnapshot, StoreError> {
-    let last = sqlx::query(select::<StageRow>("where command = ? order by id desc limit 1"))
+async fn command(connection: &mut Reading, row: &CommandRow) -> Result<CommandSnapshot, StoreError> {
+    let last = sql(select::<StageRow>("where command = ? order by id desc limit 1"))
         .bind(row.id)
         .fetch_optional(&mut *connection)
         .await?;
     let last = last.as_ref().map(StageRow::read).transpose()?;
-    let sealed = sqlx::query(select::<SealedRow>("where command = ? order by id desc limit 1"))
+    let sealed = sql(select::<SealedRow>("where command = ? order by id desc limit 1"))
         .bind(row.id)
         .fetch_optional(&mut *connection)
         .await?;
@@ -237,13 +301,12 @@ async fn command(connection: &mut SqliteConnection, row: &CommandRow) -> Result<
         ),
         None => (Stage::Queued, UtcUs(row.created_at_us), 0),
     };
-    let on_air_us: Option<i64> = sqlx::query_scalar(
-        "select max(at_us) from command_stages where command = ? and stage in ('radiating', 'radiated')",
-    )
-    .bind(row.id)
-    .fetch_one(&mut *connection)
-    .await?;
-    let condition = sqlx::query(select::<ConditionRow>("where command = ?"))
+    let on_air_us: Option<i64> =
+        sql("select max(at_us) from command_stages where command = ? and stage in ('radiating', 'radiated')")
+            .bind(row.id)
+            .scalar(&mut *connection)
+            .await?;
+    let condition = sql(select::<ConditionRow>("where command = ?"))
         .bind(row.id)
         .fetch_optional(&mut *connection)
         .await?;
@@ -269,16 +332,19 @@ fn sealed_snapshot(row: &SealedRow) -> Result<SealedSnapshot, StoreError> {
 
 /// The newest image and the first version of each chunk that is held.
 async fn image(
-    connection: &mut SqliteConnection,
+    connection: &mut Reading,
     satellite: &SatelliteId,
+    own: Own,
 ) -> Result<Option<ImageSnapshot>, StoreError> {
-    let found = sqlx::query(select::<ImageRow>("where satellite = ? order by id desc limit 1"))
+    let found = sql(select::<ImageRow>("where satellite = ? and id > ? and id < ? order by id desc limit 1"))
         .bind(satellite.as_str())
+        .bind(own.after)
+        .bind(own.before)
         .fetch_optional(&mut *connection)
         .await?;
     let Some(found) = found else { return Ok(None) };
     let image = ImageRow::read(&found)?;
-    let rows = sqlx::query(select::<ChunkRow>("where image = ? order by chunk_index, id"))
+    let rows = sql(select::<ChunkRow>("where image = ? order by chunk_index, id"))
         .bind(image.id)
         .fetch_all(&mut *connection)
         .await?;
@@ -299,14 +365,17 @@ async fn image(
 
 /// The newest heartbeat that makes sense: frame, when heard, uptime in ms.
 async fn heartbeat(
-    connection: &mut SqliteConnection,
+    connection: &mut Reading,
     satellite: &SatelliteId,
+    own: Own,
 ) -> Result<Option<(FrameId, UtcUs, u32)>, StoreError> {
-    let rows = sqlx::query(select::<FrameRow>(
-        "where satellite = ? and packet_type = ? and nested = 0 order by id desc limit ?",
+    let rows = sql(select::<FrameRow>(
+        "where satellite = ? and packet_type = ? and nested = 0 and id > ? and id < ? order by id desc limit ?",
     ))
     .bind(satellite.as_str())
     .bind(i64::from(down_type::HEARTBEAT))
+    .bind(own.after)
+    .bind(own.before)
     .bind(HEARTBEATS_TRIED)
     .fetch_all(connection)
     .await?;
@@ -323,14 +392,12 @@ async fn heartbeat(
 }
 
 /// The highest counter that is spent: by a sealed frame, or by a floor that somebody confirmed.
-async fn counter(connection: &mut SqliteConnection, key: KeyId) -> Result<Option<Counter>, StoreError> {
-    let highest: Option<i64> = sqlx::query_scalar(
-        "select max(counter) from (
+async fn counter(connection: &mut Reading, key: KeyId) -> Result<Option<Counter>, StoreError> {
+    let highest: Option<i64> = sql("select max(counter) from (
            select max(counter) as counter from sealed_frames where key = ?1
-           union all select max(counter) from counter_floors where key = ?1)",
-    )
+           union all select max(counter) from counter_floors where key = ?1) as spent")
     .bind(key.to_string())
-    .fetch_one(connection)
+    .scalar(connection)
     .await?;
     highest.map(|counter| narrow("counter", counter).map(Counter)).transpose()
 }

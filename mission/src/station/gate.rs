@@ -10,7 +10,7 @@ use super::outcome::mono_of;
 use super::satellite::Satellite;
 use super::{Link, Station};
 use crate::clock::{MonoUs, Now};
-use crate::port::LinkState;
+use crate::port::{Lease, LinkState};
 use crate::record::Gate;
 use crate::sky::clock_time;
 
@@ -19,6 +19,9 @@ const LISTEN_FIRST_US: u64 = 5_000_000;
 
 /// Satellites take turns on the air of one station; whoever waits looks again after this.
 const TAKE_TURNS_US: u64 = 250_000;
+
+/// A lease that ends sooner than this is not worth beginning with: time on the air and a slow commit fit in.
+const LEASE_MARGIN_US: u64 = 8_000_000;
 
 /// Not now.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,6 +63,7 @@ impl Station {
         self.licence_gate(now, link.config.timing.uplink_us())?;
         self.blackout_gate(now, link.config.timing.uplink_us())?;
         self.seal_gate(sat)?;
+        lease_gate(sat, now)?;
         link_gate(link, now, need.gate)?;
         contact_gate(sat, now, need.gate)?;
         silence_gate(sat, link, now)?;
@@ -107,6 +111,16 @@ impl Station {
                 None => Ok(()),
             },
         }
+    }
+}
+
+/// A key that several servers share is ours for long enough to seal, store and radiate.
+fn lease_gate(sat: &Satellite, now: Now) -> Result<(), Wait> {
+    match sat.sealer.as_ref().and_then(|sealer| sealer.lease.as_ref()) {
+        None => Ok(()),
+        Some(Lease::Ours { until, .. }) if now.mono.plus(LEASE_MARGIN_US) < *until => Ok(()),
+        Some(Lease::Ours { .. }) => Err(wait("the lease of the key ends", None)),
+        Some(Lease::NotOurs { why }) => Err(Wait { why: why.clone().into(), until: None }),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Bytes to frames, frames to records: raw first, then what follows from it.
 
-use protocol::{DownFrame, DownItem, RequestTag};
+use protocol::{DownFrame, DownItem, Downlink, RequestTag};
 
 use super::link::LastFrame;
 use super::{About, Recent, Station};
@@ -184,6 +184,29 @@ impl Station {
         if let Some(heard) = self.archive(l, &frame, how, at) {
             self.interpret(&Heard { live: false, ..heard }, &frame);
         }
+    }
+
+    /// A frame that another station heard and stored. What it says of an image enters ours, as late news would; it answers
+    /// nothing of ours and tells nothing of the contact here.
+    pub(super) fn take_elsewhere(&mut self, now: Now, id: FrameId, kept: &ReservedFrame) {
+        let Ok(frame) = DownFrame::parse(&kept.bytes) else { return };
+        let Ok(packet @ (Downlink::ImageInfo(_) | Downlink::ImageChunk(_))) = frame.packet() else { return };
+        let satellite = &kept.route.satellite;
+        let Some(link) = self.links.iter().position(|l| self.satellites[l.satellite].id == *satellite) else {
+            return;
+        };
+        let heard = Heard {
+            id,
+            route: kept.route.clone(),
+            link,
+            at: Now { mono: now.mono, utc: kept.received_at },
+            tag: None,
+            live: false,
+            from_radio: kept.source == Source::Radio,
+            length: frame.bytes().len(),
+            repeat: false,
+        };
+        self.packet(&heard, &packet);
     }
 
     /// Raw frame and reception, before anything else. What was promoted is stored already, as nested. `None` when there

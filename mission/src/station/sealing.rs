@@ -5,6 +5,7 @@ use protocol::{Counter, Key, KeyId};
 use super::journal::Ticket;
 use crate::clock::UtcUs;
 use crate::config::CounterRule;
+use crate::port::Lease;
 use crate::snapshot::{KeySnapshot, Witness};
 
 /// A clock further ahead of the last counter than this needs somebody who vouches for it.
@@ -53,6 +54,8 @@ pub(super) struct Sealer {
     pub(super) unlock_asked: bool,
     /// The leap was told already.
     pub(super) leap_told: bool,
+    /// Who may seal, when several servers share the key.
+    pub(super) lease: Option<Lease>,
 }
 
 /// A counter to seal with.
@@ -79,6 +82,7 @@ impl Sealer {
             unlocking: None,
             unlock_asked: false,
             leap_told: false,
+            lease: None,
         };
         match (database, witness) {
             (None, Witness::Missing) => {}
@@ -118,6 +122,14 @@ impl Sealer {
             None if self.last >= Some(COUNTER_MAX) => Some(Lock::Exhausted),
             None => None,
         }
+    }
+
+    /// Who may seal now. What others spent is spent.
+    pub(super) fn leased(&mut self, lease: &Lease) {
+        if let Lease::Ours { spent: Some(spent), .. } = lease {
+            self.spend(*spent);
+        }
+        self.lease = Some(lease.clone());
     }
 
     /// Whether an operator can unlock it.

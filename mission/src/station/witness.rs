@@ -7,13 +7,22 @@ use super::{About, Station};
 use crate::clock::Now;
 use crate::id::Principal;
 use crate::level::Level;
-use crate::port::Effect;
+use crate::port::{Effect, Lease};
 use crate::record::{CounterFloorRecord, EventKind, Record, Subject};
 
 /// A witness that could not be raised is tried again after this.
 const WITNESS_RETRY_US: u64 = 2_000_000;
 
 impl Station {
+    /// Who may seal with a key that several servers share.
+    pub(super) fn lease(&mut self, key: KeyId, lease: &Lease) {
+        for sealer in self.satellites.iter_mut().filter_map(|sat| sat.sealer.as_mut()) {
+            if sealer.id == key {
+                sealer.leased(lease);
+            }
+        }
+    }
+
     pub(super) fn witness_done(&mut self, now: Now, key: KeyId, counter: Counter) {
         for s in 0..self.satellites.len() {
             let sat = &mut self.satellites[s];

@@ -93,6 +93,7 @@ impl Bench {
             station: Some(station.station.clone()),
             simulated: true,
             max_page_count: None,
+            postgres: None,
             reserve_bytes: 1 << 16,
         });
         let store = store.await.unwrap();

@@ -2,9 +2,9 @@
 
 use mission::record::EventKind;
 use mission::{Level, Principal};
-use sqlx::Row as _;
 
 use super::super::convert::exactly;
+use super::super::db::sql;
 use super::super::row::{Row as _, select};
 use super::super::{AuditRow, EventRow, IntentRow, LimitRow, Store, StoreError, StoredEvent, StoredIntent};
 use super::{List, Page, Scope};
@@ -70,7 +70,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn last_event_seq(&self) -> Result<i64, StoreError> {
-        Ok(sqlx::query_scalar("select coalesce(max(seq), 0) from events").fetch_one(&self.0.readers).await?)
+        sql("select coalesce(max(seq), 0) from events").scalar(&self.0.readers).await
     }
 
     /// The state of every limit that was ever left, by satellite and parameter.
@@ -78,9 +78,8 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn limits(&self) -> Result<Vec<LimitRow>, StoreError> {
-        let rows = sqlx::query(select::<LimitRow>("order by satellite, parameter"))
-            .fetch_all(&self.0.readers)
-            .await?;
+        let rows =
+            sql(select::<LimitRow>("order by satellite, parameter")).fetch_all(&self.0.readers).await?;
         rows.iter().map(LimitRow::read).collect()
     }
 
@@ -97,7 +96,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn counts(&self) -> Result<Counts, StoreError> {
-        let row = sqlx::query(
+        let row = sql(
             "select (select count(*) from frames) as frames, (select count(*) from receptions) as receptions,
                (select count(*) from commands) as commands, (select count(*) from sealed_frames) as sealed_frames,
                (select count(*) from images) as images, (select count(*) from chunks) as chunks,
@@ -123,7 +122,7 @@ pub(in crate::storage) async fn find_intent(
     principal: &Principal,
     idempotency_key: &str,
 ) -> Result<Option<StoredIntent>, StoreError> {
-    let found = sqlx::query(select::<IntentRow>("where principal = ? and idempotency_key = ?"))
+    let found = sql(select::<IntentRow>("where principal = ? and idempotency_key = ?"))
         .bind(principal.as_str())
         .bind(idempotency_key)
         .fetch_optional(&store.0.readers)

@@ -1,5 +1,10 @@
 //! Raw frames and who heard them.
 
+use mission::port::ReservedFrame;
+use mission::{FrameId, UtcUs};
+
+use super::super::convert::{int, route};
+use super::super::db::sql;
 use super::super::row::Row as _;
 use super::super::row::select;
 use super::super::{FrameRow, ReceptionRow, Store, StoreError};
@@ -44,7 +49,7 @@ impl Store {
             .map(|heard| heard.frame.id)
             .fold((i64::MAX, 0), |(low, high), id| (low.min(id), high.max(id)));
         if high - low < 4 * heard.len() as i64 {
-            let rows = sqlx::query(select::<ReceptionRow>("where frame between ? and ? order by id"))
+            let rows = sql(select::<ReceptionRow>("where frame between ? and ? order by id"))
                 .bind(low)
                 .bind(high)
                 .fetch_all(&self.0.readers)
@@ -61,6 +66,45 @@ impl Store {
             }
         }
         Ok(heard)
+    }
+
+    /// A frame as the engine takes it, as it was first heard.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database cannot be read or holds what nobody wrote.
+    pub async fn frame_as_kept(&self, id: FrameId) -> Result<Option<ReservedFrame>, StoreError> {
+        let Some(heard) = self.frame(int("frame", id.0)?).await? else { return Ok(None) };
+        let Some(first) = heard.receptions.first().filter(|_| !heard.frame.nested) else { return Ok(None) };
+        Ok(Some(ReservedFrame {
+            route: route(&first.satellite, &first.station, &first.link)?,
+            source: first.source()?,
+            received_at: UtcUs(heard.frame.heard_at_us),
+            rssi_dbm: first.rssi_dbm.and_then(|dbm| i16::try_from(dbm).ok()),
+            bytes: heard.frame.bytes.into(),
+        }))
+    }
+
+    /// Those of these frames that the archive does not have: the reserve may hold some that were stored after all.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database cannot be read.
+    pub async fn not_yet_stored(&self, kept: Vec<ReservedFrame>) -> Result<Vec<ReservedFrame>, StoreError> {
+        let mut missing = Vec::new();
+        for frame in kept {
+            let there: i64 = sql("select count(*) from frames
+                 where satellite = ? and station = ? and heard_at_us = ? and link = ? and bytes = ?")
+            .bind(frame.route.satellite.as_str())
+            .bind(frame.route.station.as_str())
+            .bind(frame.received_at.0)
+            .bind(frame.route.link.as_str())
+            .bind(frame.bytes.to_vec())
+            .scalar(&self.0.readers)
+            .await?;
+            if there == 0 {
+                missing.push(frame);
+            }
+        }
+        Ok(missing)
     }
 
     /// A frame with its receptions.

@@ -19,8 +19,7 @@ pub use telemetry::{Bucket, LatestValue, Sample, Samples, Series, TelemetryQuery
 
 pub(super) use events::find_intent;
 
-use sqlx::{QueryBuilder, Sqlite};
-
+use super::db::{Builder, sql};
 use super::row::Row;
 use super::{Store, StoreError};
 
@@ -57,12 +56,12 @@ pub struct Scope {
 
 /// A list with conditions; values are bound, never written into the statement.
 pub(super) struct List {
-    statement: QueryBuilder<Sqlite>,
+    statement: Builder,
 }
 
 impl List {
     pub(super) fn of<R: Row>() -> Self {
-        Self { statement: QueryBuilder::new(format!("{} where true", R::SELECT)) }
+        Self { statement: Builder::new(format!("{} where true", R::SELECT)) }
     }
 
     pub(super) fn equal(mut self, column: &'static str, value: Option<&str>) -> Self {
@@ -82,9 +81,8 @@ impl List {
     fn any_of(mut self, column: &'static str, words: Option<Vec<&'static str>>) -> Self {
         if let Some(words) = words {
             self.statement.push(format_args!(" and {column} in ("));
-            let mut list = self.statement.separated(", ");
-            for word in words {
-                list.push_bind(word);
+            for (at, word) in words.into_iter().enumerate() {
+                self.statement.push(if at == 0 { "" } else { ", " }).push_bind(word);
             }
             self.statement.push(")");
         }
@@ -119,13 +117,12 @@ impl List {
 
 /// At most one row.
 async fn one<R: Row>(store: &Store, condition: &'static str, id: i64) -> Result<Option<R>, StoreError> {
-    let row =
-        sqlx::query(super::row::select::<R>(condition)).bind(id).fetch_optional(&store.0.readers).await?;
+    let row = sql(super::row::select::<R>(condition)).bind(id).fetch_optional(&store.0.readers).await?;
     row.as_ref().map(R::read).transpose()
 }
 
 /// All rows that belong to something.
 async fn all<R: Row>(store: &Store, condition: &'static str, id: i64) -> Result<Vec<R>, StoreError> {
-    let rows = sqlx::query(super::row::select::<R>(condition)).bind(id).fetch_all(&store.0.readers).await?;
+    let rows = sql(super::row::select::<R>(condition)).bind(id).fetch_all(&store.0.readers).await?;
     rows.iter().map(R::read).collect()
 }

@@ -1,7 +1,6 @@
 //! Plans and their runs.
 
-use sqlx::Row as _;
-
+use super::super::db::sql;
 use super::super::{ConditionRow, PlanRow, RunRow, Store, StoreError};
 use super::{List, Page, Scope, one};
 
@@ -58,7 +57,7 @@ impl Store {
         from_us: i64,
         to_us: i64,
     ) -> Result<HeardCounts, StoreError> {
-        let row = sqlx::query(
+        let row = sql(
             "with heard as (select id from frames where satellite = ? and station = ? and heard_at_us between ? and ?)
              select (select count(*) from heard) as frames,
                (select count(*) from chunks where conflict = 0 and frame in (select id from heard)) as chunks",

@@ -1,5 +1,6 @@
 //! Elements, and passes with the elements they used.
 
+use super::super::db::sql;
 use super::super::row::{Row as _, select};
 use super::super::{ElementsRow, PassElementsRow, PassRow, Store, StoreError};
 use super::{List, Page, Scope, all, one};
@@ -35,10 +36,10 @@ impl Store {
         let condition = "where satellite = ?1
             and epoch_us >= coalesce(
                 (select max(epoch_us) from elements where satellite = ?1 and epoch_us <= ?2), ?2)
-            and epoch_us <= max(?3, coalesce(
-                (select min(epoch_us) from elements where satellite = ?1), ?3))
+            and (epoch_us <= ?3
+                or epoch_us <= (select min(epoch_us) from elements where satellite = ?1))
             order by epoch_us desc, id desc limit ?4";
-        let rows = sqlx::query(select::<ElementsRow>(condition))
+        let rows = sql(select::<ElementsRow>(condition))
             .bind(satellite)
             .bind(from_us)
             .bind(until_us)

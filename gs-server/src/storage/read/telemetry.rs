@@ -1,7 +1,6 @@
 //! Values over time, thinned out here so that a year costs no more to send than an hour.
 
-use sqlx::Row as _;
-
+use super::super::db::sql;
 use super::super::row::{Row as _, select};
 use super::super::{ParameterRow, Store, StoreError, TelemetryRow};
 
@@ -94,9 +93,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn parameters(&self) -> Result<Vec<ParameterRow>, StoreError> {
-        let rows = sqlx::query(select::<ParameterRow>("order by satellite, name"))
-            .fetch_all(&self.0.readers)
-            .await?;
+        let rows = sql(select::<ParameterRow>("order by satellite, name")).fetch_all(&self.0.readers).await?;
         rows.iter().map(ParameterRow::read).collect()
     }
 
@@ -120,7 +117,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn telemetry(&self, query: &TelemetryQuery) -> Result<Option<Series>, StoreError> {
-        let found = sqlx::query(select::<ParameterRow>("where satellite = ? and name = ?"))
+        let found = sql(select::<ParameterRow>("where satellite = ? and name = ?"))
             .bind(&query.satellite)
             .bind(&query.parameter)
             .fetch_optional(&self.0.readers)
@@ -131,7 +128,7 @@ impl Store {
             0 => 1000,
             points => points.min(MOST_POINTS),
         };
-        let rows = sqlx::query(select::<TelemetryRow>(
+        let rows = sql(select::<TelemetryRow>(
             "where parameter = ? and at_us >= ? and at_us < ? order by at_us, frame limit ?",
         ))
         .bind(parameter.id)
@@ -155,7 +152,7 @@ impl Store {
         start_us: i64,
         stop_us: i64,
     ) -> Result<Option<Sample>, StoreError> {
-        let row = sqlx::query(select::<TelemetryRow>(
+        let row = sql(select::<TelemetryRow>(
             "where parameter = ? and at_us >= ? and at_us < ? order by at_us desc, frame desc limit 1",
         ))
         .bind(parameter)
@@ -175,36 +172,36 @@ impl Store {
         count: u32,
     ) -> Result<Vec<Bucket>, StoreError> {
         // The span that holds values: who asks from 1970 to the end of time still gets useful buckets.
-        let (first, last): (i64, i64) = sqlx::query_as(
-            "select (select min(at_us) from telemetry where parameter = ?1 and at_us >= ?2 and at_us < ?3),
-                    (select max(at_us) from telemetry where parameter = ?1 and at_us >= ?2 and at_us < ?3)",
+        let span = sql(
+            "select (select min(at_us) from telemetry where parameter = ?1 and at_us >= ?2 and at_us < ?3) as first,
+                    (select max(at_us) from telemetry where parameter = ?1 and at_us >= ?2 and at_us < ?3) as last",
         )
         .bind(parameter)
         .bind(query.start_us)
         .bind(query.stop_us)
         .fetch_one(&self.0.readers)
         .await?;
+        let (first, last): (i64, i64) = (span.try_get("first")?, span.try_get("last")?);
         let width_us = (last.abs_diff(first) / u64::from(count) + 1).try_into().unwrap_or(i64::MAX);
         let mut buckets = Vec::with_capacity(count as usize);
         let mut start_us = first;
         while start_us <= last {
             let stop_us = start_us.saturating_add(width_us);
-            let row = sqlx::query(
-                "select count(*) as rows, count(value) as count, min(value) as min, max(value) as max,
-                   avg(value) as mean from telemetry where parameter = ? and at_us >= ? and at_us < ?",
-            )
-            .bind(parameter)
-            .bind(start_us)
-            .bind(stop_us)
-            .fetch_one(&self.0.readers)
-            .await?;
+            let row =
+                sql("select count(*) as rows, count(value) as count, min(value) as min, max(value) as max,
+                   avg(value) as mean from telemetry where parameter = ? and at_us >= ? and at_us < ?")
+                .bind(parameter)
+                .bind(start_us)
+                .bind(stop_us)
+                .fetch_one(&self.0.readers)
+                .await?;
             let count: i64 = row.try_get("count")?;
             if let Some(last) = self.newest(parameter, start_us, stop_us).await? {
                 buckets.push(Bucket {
                     start_us,
                     stop_us,
                     count,
-                    invalid: row.try_get::<i64, _>("rows")? - count,
+                    invalid: row.try_get::<i64>("rows")? - count,
                     min: row.try_get("min")?,
                     max: row.try_get("max")?,
                     mean: row.try_get("mean")?,

@@ -8,12 +8,12 @@ use sqlx::{AssertSqlSafe, Connection as _};
 
 use super::super::*;
 use super::records::*;
-use super::{Dice, fresh, options, reopen};
+use super::{Dice, Kind, Place, fresh, options, reopen};
 
 const ROWS: i64 = 12;
 
-async fn written() -> (tempfile::TempDir, PathBuf) {
-    let (parent, store) = fresh().await;
+async fn written() -> (Place, PathBuf) {
+    let (parent, store) = fresh(Kind::Lite).await;
     for _ in 0..ROWS / 2 {
         let two = vec![Record::Audit(audit("command.create")), Record::Audit(audit("uplink.radiate"))];
         store.apply(&batch(two)).await.unwrap();
@@ -114,6 +114,7 @@ async fn a_chain_made_anew_does_not_end_in_the_head_that_was_noted() {
         .await
         .unwrap();
     sqlx::raw_sql("delete from audit_links").execute(&mut db).await.unwrap();
+    let mut db = super::super::db::Connection::Lite(db);
     audit_chain::begin(&mut db).await.unwrap();
     db.close().await.unwrap();
     let file = verdict(&folder).await;
@@ -166,9 +167,10 @@ async fn any_changed_byte_of_a_row_is_found() {
 async fn rows_from_before_the_chain_are_tied_at_the_first_opening() {
     let (parent, folder) = written().await;
     tamper(&folder, "delete from audit_links").await;
-    let mut db = SqliteConnection::connect_with(&SqliteConnectOptions::new().filename(folder.join(DATABASE)))
+    let db = SqliteConnection::connect_with(&SqliteConnectOptions::new().filename(folder.join(DATABASE)))
         .await
         .unwrap();
+    let mut db = super::super::db::Connection::Lite(db);
     audit_chain::begin(&mut db).await.unwrap();
     db.close().await.unwrap();
     let right = verdict(&folder).await;

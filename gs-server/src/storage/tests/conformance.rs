@@ -6,11 +6,11 @@ use protocol::{Downlink, Telecommand};
 
 use super::super::*;
 use super::records::*;
-use super::{fresh, reopen};
+use super::{Kind, fresh, reopen};
 
-#[tokio::test]
-async fn a_heard_frame_is_read_back_with_who_heard_it() {
-    let (_parent, store) = fresh().await;
+both!(a_heard_frame_is_read_back_with_who_heard_it);
+async fn a_heard_frame_is_read_back_with_who_heard_it(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let packet = Downlink::Heartbeat(heartbeat(1));
     let frame = frame_of(1, &packet, &route());
     let first = reception_of(&frame);
@@ -46,9 +46,9 @@ async fn a_heard_frame_is_read_back_with_who_heard_it() {
     assert_eq!(store.frame(2).await.unwrap(), None);
 }
 
-#[tokio::test]
-async fn a_frame_inside_what_was_no_frame_counts_after_all() {
-    let (_parent, store) = fresh().await;
+both!(a_frame_inside_what_was_no_frame_counts_after_all);
+async fn a_frame_inside_what_was_no_frame_counts_after_all(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let frame = frame_of(1, &Downlink::Heartbeat(heartbeat(1)), &route());
     let nested = mission::record::FrameRecord { nested: true, ..frame.clone() };
     store.apply(&batch(vec![Record::Frame(nested)])).await.unwrap();
@@ -61,9 +61,9 @@ async fn a_frame_inside_what_was_no_frame_counts_after_all() {
     assert_eq!((read.heard_at_us, read.station.as_str()), (frame.heard_at.0, "oslo"), "nothing else changes");
 }
 
-#[tokio::test]
-async fn frames_come_in_pages_both_ways_and_by_scope_and_type() {
-    let (_parent, store) = fresh().await;
+both!(frames_come_in_pages_both_ways_and_by_scope_and_type);
+async fn frames_come_in_pages_both_ways_and_by_scope_and_type(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     for id in 1..=250 {
         let (packet, route) = if id % 50 == 0 {
             (Downlink::Pong, other_route())
@@ -96,9 +96,9 @@ async fn frames_come_in_pages_both_ways_and_by_scope_and_type() {
     assert_eq!(ids(FrameQuery { scope, ..FrameQuery::default() }).await, [0; 0]);
 }
 
-#[tokio::test]
-async fn a_command_is_read_back_with_its_life() {
-    let (parent, store) = fresh().await;
+both!(a_command_is_read_back_with_its_life);
+async fn a_command_is_read_back_with_its_life(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     let telecommand = Telecommand::GetImageChunk { first: 3, count: 9 };
     let records = vec![
         Record::Stage(stage(1, 0, Stage::Queued, NOON_US)),
@@ -147,9 +147,9 @@ async fn a_command_is_read_back_with_its_life() {
     assert_eq!(store.command(3).await.unwrap(), None);
 }
 
-#[tokio::test]
-async fn an_image_grows_and_is_cut_at_its_size() {
-    let (_parent, store) = fresh().await;
+both!(an_image_grows_and_is_cut_at_its_size);
+async fn an_image_grows_and_is_cut_at_its_size(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let frames = (1..=9).map(|id| Record::Frame(frame_of(id, &Downlink::Pong, &route())));
     let mut records: Vec<Record> = frames.collect();
     records.push(Record::Image(image(1, 1, 4)));
@@ -184,9 +184,9 @@ async fn an_image_grows_and_is_cut_at_its_size() {
     assert_eq!(store.image_bytes(2).await.unwrap(), None);
 }
 
-#[tokio::test]
-async fn downloads_limits_audit_and_intents_are_read_back() {
-    let (_parent, store) = fresh().await;
+both!(downloads_limits_audit_and_intents_are_read_back);
+async fn downloads_limits_audit_and_intents_are_read_back(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let records = vec![
         Record::Frame(frame_of(1, &Downlink::Pong, &route())),
         Record::Image(image(1, 1, 4)),
@@ -226,9 +226,9 @@ async fn downloads_limits_audit_and_intents_are_read_back() {
     assert_eq!(store.find_intent(&Principal::new("eve"), "0").await.unwrap(), None);
 }
 
-#[tokio::test]
-async fn events_keep_their_place_and_everything_they_say() {
-    let (parent, store) = fresh().await;
+both!(events_keep_their_place_and_everything_they_say);
+async fn events_keep_their_place_and_everything_they_say(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     let full = EventRecord {
         level: Level::Distress,
         key: Some(key()),
@@ -275,9 +275,9 @@ async fn events_keep_their_place_and_everything_they_say() {
     assert_eq!(sequences, [last, i64::try_from(limit).unwrap(), 2]);
 }
 
-#[tokio::test]
-async fn everything_is_counted() {
-    let (_parent, store) = fresh().await;
+both!(everything_is_counted);
+async fn everything_is_counted(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     store.apply(&batch(heard(1))).await.unwrap();
     let counts = store.counts().await.unwrap();
     assert_eq!(counts, Counts { frames: 1, receptions: 1, events: 2, ..Counts::default() });
@@ -287,7 +287,7 @@ async fn everything_is_counted() {
 #[tokio::test]
 #[ignore = "a figure, not a check"]
 async fn figure_latency_of_a_typical_batch() {
-    let (_parent, store) = fresh().await;
+    let (_parent, store) = fresh(Kind::Lite).await;
     let mut micros = Vec::new();
     for id in 1..=1000 {
         let records = batch(heard(id));

@@ -46,6 +46,7 @@ async fn template(folder: &Path) -> Vec<String> {
         station: Some(route().station),
         simulated: false,
         max_page_count: None,
+        postgres: None,
         reserve_bytes: 0,
     })
     .await

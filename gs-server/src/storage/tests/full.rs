@@ -88,6 +88,7 @@ async fn child() {
         station: Some(super::records::route().station),
         simulated: false,
         max_page_count: None,
+        postgres: None,
         reserve_bytes: 16 * 512,
     };
     let store = Store::open(options).await.unwrap();

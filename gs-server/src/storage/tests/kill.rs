@@ -20,6 +20,7 @@ async fn child() {
         station: Some(super::records::route().station),
         simulated: false,
         max_page_count: None,
+        postgres: None,
         reserve_bytes: 0,
     })
     .await

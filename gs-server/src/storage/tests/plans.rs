@@ -10,7 +10,7 @@ use protocol::Telecommand;
 
 use super::super::{Page, Scope};
 use super::records::*;
-use super::{fresh, reopen};
+use super::{Kind, fresh, reopen};
 use crate::plan::check_words;
 
 const TEXT: &str = r#"{"name":"status","satellite":"pixelsat-1","transmit":true,"at_los":"finish-later",
@@ -50,9 +50,9 @@ fn run(id: u64, plan: u64, state: RunState, end: Option<RunEnd>) -> Record {
     }))
 }
 
-#[tokio::test]
-async fn plans_and_runs_come_back_as_they_were() {
-    let (parent, store) = fresh().await;
+both!(plans_and_runs_come_back_as_they_were);
+async fn plans_and_runs_come_back_as_they_were(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     let waiting = RunState::Waiting("the link is away".to_owned());
     let records = vec![
         Record::Plan(plan(1, false)),
@@ -75,9 +75,9 @@ async fn plans_and_runs_come_back_as_they_were() {
     assert_eq!(store.runs(&Scope::default(), &Page::default()).await.unwrap().len(), 4);
 }
 
-#[tokio::test]
-async fn withdrawn_plan_is_kept_and_not_taken_up() {
-    let (_parent, store) = fresh().await;
+both!(withdrawn_plan_is_kept_and_not_taken_up);
+async fn withdrawn_plan_is_kept_and_not_taken_up(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     store.apply(&batch(vec![Record::Plan(plan(1, true))])).await.unwrap();
     let gone = PlanRecord { withdrawn_at: Some(UtcUs(NOON_US + 1)), armed: false, ..plan(1, true) };
     store.apply(&batch(vec![Record::Plan(gone)])).await.unwrap();
@@ -85,9 +85,9 @@ async fn withdrawn_plan_is_kept_and_not_taken_up() {
     assert_eq!(store.plans(&Page::default()).await.unwrap().len(), 1);
 }
 
-#[tokio::test]
-async fn conditions_stand_beside_their_commands() {
-    let (_parent, store) = fresh().await;
+both!(conditions_stand_beside_their_commands);
+async fn conditions_stand_beside_their_commands(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let when = Condition {
         min_elevation_deg: Some(12.5),
         heard_within_us: Some(30_000_000),

@@ -1,5 +1,7 @@
 //! Records as the engine makes them.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use mission::record::{
     AuditRecord, ChunkRecord, CommandRecord, CounterFloorRecord, DownloadRecord, DownloadState, EventKind,
     EventRecord, FrameRecord, Gate, ImageRecord, LimitRecord, ReceptionRecord, Record, Route, SealedRecord,
@@ -16,8 +18,10 @@ use protocol::{
 
 pub(super) const NOON_US: i64 = 1_795_000_000_000_000;
 
+/// A batch with a number of its own, as the engine gives them.
 pub(super) fn batch(records: Vec<Record>) -> Batch {
-    Batch { id: BatchId(1), records }
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    Batch { id: BatchId(NEXT.fetch_add(1, Ordering::Relaxed)), records }
 }
 
 pub(super) fn route() -> Route {

@@ -1,8 +1,8 @@
 //! Values are made again from raw frames, and damage to them is found and mended.
 
 use super::super::*;
-use super::fresh;
 use super::records::*;
+use super::{Kind, fresh};
 use mission::record::{DECODER_VERSION, Record};
 use protocol::Downlink;
 
@@ -10,13 +10,13 @@ use protocol::Downlink;
 async fn meddle(store: &Store, statement: &'static str) {
     let mut writer = store.0.writer.lock().await;
     let mut connection = writer.begin().await.unwrap();
-    sqlx::query(statement).execute(&mut connection).await.unwrap();
+    super::super::db::sql(statement).execute(&mut connection).await.unwrap();
     writer.end(connection, Ok(())).await.unwrap();
 }
 
-#[tokio::test]
-async fn what_is_right_is_left_alone() {
-    let (_parent, store) = fresh().await;
+both!(what_is_right_is_left_alone);
+async fn what_is_right_is_left_alone(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     for id in 1..=450 {
         store.apply(&batch(heard(id))).await.unwrap();
     }
@@ -28,9 +28,9 @@ async fn what_is_right_is_left_alone() {
     assert_eq!((report.added, report.changed, report.removed, report.damaged), (0, 0, 0, 0), "{report:?}");
 }
 
-#[tokio::test]
-async fn what_is_missing_wrong_or_too_much_is_mended() {
-    let (_parent, store) = fresh().await;
+both!(what_is_missing_wrong_or_too_much_is_mended);
+async fn what_is_missing_wrong_or_too_much_is_mended(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     for id in 1..=20 {
         store.apply(&batch(heard(id))).await.unwrap();
     }
@@ -66,9 +66,9 @@ async fn what_is_missing_wrong_or_too_much_is_mended() {
     assert!(after.iter().all(|value| value.sample.frame == 21));
 }
 
-#[tokio::test]
-async fn it_goes_on_where_it_was_broken_off() {
-    let (_parent, store) = fresh().await;
+both!(it_goes_on_where_it_was_broken_off);
+async fn it_goes_on_where_it_was_broken_off(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     for id in 1..=10 {
         store.apply(&batch(heard(id))).await.unwrap();
     }
@@ -83,11 +83,15 @@ async fn it_goes_on_where_it_was_broken_off() {
     );
 }
 
-#[tokio::test]
-async fn damage_that_cannot_be_mended_is_told() {
-    let (_parent, store) = fresh().await;
+both!(damage_that_cannot_be_mended_is_told);
+async fn damage_that_cannot_be_mended_is_told(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     store.apply(&batch(heard(1))).await.unwrap();
-    meddle(&store, "drop trigger events_are_never_changed").await;
+    let drop = match kind {
+        Kind::Lite => "drop trigger events_are_never_changed",
+        Kind::Pg => "drop trigger events_are_never_changed on events",
+    };
+    meddle(&store, drop).await;
     meddle(&store, "update events set message = 'nothing happened' where seq = 1").await;
     let report = store.redecode(|_| {}).await.unwrap();
     assert_eq!((report.damaged, report.findings.len()), (1, 1));

@@ -1,21 +1,15 @@
 //! Elements, and passes with what they used.
 
-use std::borrow::Cow;
-use std::path::Path;
 use std::sync::Arc;
 
 use mission::record::{ElementsRecord, PassRecord, Record};
 use mission::{ElementsId, PassId, Principal, SatelliteId, UtcUs};
-use sqlx::migrate::Migrator;
-use sqlx::{AssertSqlSafe, Connection as _, SqliteConnection};
 use tle::formats::{Checksums, sets};
 use tle::{Elements, UtcInstant};
 
-use super::super::open::schema_crc;
-use super::super::row::{Row as _, select, upsert};
-use super::super::{DATABASE, FrameQuery, MetaRow, Page, Scope, Store, StoreError};
+use super::super::{Page, Scope, Store, StoreError};
 use super::records::*;
-use super::{Dice, fresh, reopen};
+use super::{Dice, Kind, fresh, reopen};
 
 /// Every field that a message can have, and numbers without a short decimal form.
 const OMM: &str = r#"[{"CCSDS_OMM_VERS":"3.0","COMMENT":"café \"quoted\"","CREATION_DATE":"2026-11-20T01:02:03.000004","ORIGINATOR":"18 SPCS",
@@ -84,9 +78,9 @@ fn bits(set: &Elements) -> Vec<u64> {
     .to_vec()
 }
 
-#[tokio::test]
-async fn elements_come_back_bit_for_bit() {
-    let (parent, store) = fresh().await;
+both!(elements_come_back_bit_for_bit);
+async fn elements_come_back_bit_for_bit(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     let mut dice = Dice(11);
     let mut given = vec![omm()];
     for _ in 0..40 {
@@ -128,9 +122,9 @@ async fn elements_come_back_bit_for_bit() {
     assert_eq!(store.elements(&other, &everything()).await.unwrap(), []);
 }
 
-#[tokio::test]
-async fn sets_of_a_window_are_those_that_tell_something_in_it() {
-    let (_parent, store) = fresh().await;
+both!(sets_of_a_window_are_those_that_tell_something_in_it);
+async fn sets_of_a_window_are_those_that_tell_something_in_it(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     // Not in the order of their epochs; two of one epoch; one of somebody else.
     let mut records: Vec<Record> =
         [(1, 50), (2, 10), (3, 30), (4, 30), (5, 20)].map(|(id, us)| epoch(id, us)).into();
@@ -150,9 +144,9 @@ async fn sets_of_a_window_are_those_that_tell_something_in_it() {
     assert!(store.elements_between("nobody", (0, 90), 100).await.unwrap().is_empty());
 }
 
-#[tokio::test]
-async fn a_pass_is_brought_up_to_date_and_keeps_what_it_used() {
-    let (_parent, store) = fresh().await;
+both!(a_pass_is_brought_up_to_date_and_keeps_what_it_used);
+async fn a_pass_is_brought_up_to_date_and_keeps_what_it_used(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     store.apply(&batch(vec![epoch(1, 10), epoch(2, 20)])).await.unwrap();
     store.apply(&batch(vec![Record::Pass(pass(1, &[(1, 100)], None))])).await.unwrap();
     let later = PassRecord {
@@ -176,21 +170,15 @@ async fn a_pass_is_brought_up_to_date_and_keeps_what_it_used() {
     assert_eq!(store.passes(&Scope::default(), &everything()).await.unwrap().len(), 1);
 }
 
-async fn beside(parent: &tempfile::TempDir) -> SqliteConnection {
-    let path = parent.path().join("data").join(DATABASE);
-    SqliteConnection::connect(path.to_str().unwrap()).await.unwrap()
-}
-
 async fn one_of_each(store: &Store) {
     let records = vec![epoch(1, 10), Record::Pass(pass(1, &[(1, 100)], None))];
     store.apply(&batch(records)).await.unwrap();
 }
 
-#[tokio::test]
-async fn elements_passes_and_what_they_used_are_not_rewritten() {
-    let (parent, store) = fresh().await;
+both!(elements_passes_and_what_they_used_are_not_rewritten);
+async fn elements_passes_and_what_they_used_are_not_rewritten(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     one_of_each(&store).await;
-    let mut other = beside(&parent).await;
     for change in [
         "delete from elements",
         "update elements set omm = '[]'",
@@ -198,26 +186,34 @@ async fn elements_passes_and_what_they_used_are_not_rewritten() {
         "delete from pass_elements",
         "update pass_elements set from_us = 0",
     ] {
-        let error = sqlx::query(change).execute(&mut other).await.unwrap_err().to_string();
+        let error = parent.meddle(change).await.unwrap_err();
         assert!(error.contains("never"), "{change}: {error}");
     }
 }
 
-#[tokio::test]
-async fn a_damaged_row_is_noticed() {
-    let (parent, store) = fresh().await;
+both!(a_damaged_row_is_noticed);
+async fn a_damaged_row_is_noticed(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     one_of_each(&store).await;
     let scope = Scope::default();
     assert!(store.elements(&scope, &everything()).await.is_ok());
-    let mut other = beside(&parent).await;
+    let drop_trigger = match kind {
+        Kind::Lite => {
+            ["drop trigger elements_are_never_changed", "drop trigger pass_elements_are_never_changed"]
+        }
+        Kind::Pg => [
+            "drop trigger elements_are_never_changed on elements",
+            "drop trigger pass_elements_are_never_changed on pass_elements",
+        ],
+    };
     for damage in [
-        "drop trigger elements_are_never_changed",
+        drop_trigger[0],
         "update elements set omm = replace(omm, '15.2', '15.3')",
         "update passes set max_elevation_deg = 89.0",
-        "drop trigger pass_elements_are_never_changed",
+        drop_trigger[1],
         "update pass_elements set from_us = 101",
     ] {
-        sqlx::query(damage).execute(&mut other).await.unwrap();
+        parent.meddle(damage).await.unwrap();
     }
     let damaged = |error: StoreError| assert!(matches!(error, StoreError::Damaged { .. }), "{error:?}");
     damaged(store.elements(&scope, &everything()).await.unwrap_err());
@@ -228,9 +224,9 @@ async fn a_damaged_row_is_noticed() {
     damaged(store.snapshot(&[route().satellite], &[]).await.unwrap_err());
 }
 
-#[tokio::test]
-async fn a_restart_goes_on_with_the_newest_sets_and_the_open_pass() {
-    let (parent, store) = fresh().await;
+both!(a_restart_goes_on_with_the_newest_sets_and_the_open_pass);
+async fn a_restart_goes_on_with_the_newest_sets_and_the_open_pass(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     // The newest by epoch is the first that was added.
     let sets: Vec<Record> = (1..=70).map(|id| epoch(id, NOON_US - id.cast_signed() * 1_000_000)).collect();
     store.apply(&batch(sets)).await.unwrap();
@@ -257,63 +253,4 @@ async fn a_restart_goes_on_with_the_newest_sets_and_the_open_pass() {
     store.apply(&batch(vec![Record::Pass(pass(2, &[(70, 7), (1, 9)], Some(NOON_US)))])).await.unwrap();
     let snapshot = store.snapshot(&[route().satellite], &[]).await.unwrap();
     assert_eq!(snapshot.satellites[0].pass, None, "it is over");
-}
-
-/// A database as the first schema made it, with what is in another one.
-async fn of_the_first_schema(path: &Path, filled: &Path) {
-    let first: Vec<_> = migrations::SQLITE.iter().take(1).cloned().collect();
-    let migrator = Migrator { migrations: Cow::Owned(first), ..Migrator::DEFAULT };
-    let address = format!("sqlite://{}?mode=rwc", path.display());
-    let mut old = SqliteConnection::connect(&address).await.unwrap();
-    migrator.run(&mut old).await.unwrap();
-    let tables: Vec<String> = sqlx::query_scalar(
-        "select name from sqlite_schema where type = 'table' and name not like 'sqlite~_%' escape '~' and name <> '_sqlx_migrations'",
-    )
-    .fetch_all(&mut old)
-    .await
-    .unwrap();
-    assert!(tables.len() > 10 && !tables.contains(&"elements".to_owned()), "{tables:?}");
-    let run = [format!("attach '{}' as filled", filled.display()), "pragma foreign_keys = off".to_owned()];
-    let copies = tables
-        .iter()
-        .map(|table| format!("insert or replace into main.{table} select * from filled.{table}"));
-    for statement in run.into_iter().chain(copies) {
-        sqlx::query(AssertSqlSafe(statement)).execute(&mut old).await.unwrap();
-    }
-    // As that program signed its tables.
-    let row = sqlx::query(select::<MetaRow>("where id = 1")).fetch_one(&mut old).await.unwrap();
-    let meta = MetaRow { schema_crc: schema_crc(&mut old).await.unwrap(), ..MetaRow::read(&row).unwrap() };
-    meta.bind(sqlx::query(upsert::<MetaRow>("id"))).execute(&mut old).await.unwrap();
-    old.close().await.unwrap();
-}
-
-#[tokio::test]
-async fn an_older_database_is_brought_up_to_date_with_all_that_is_in_it() {
-    let (parent, store) = fresh().await;
-    for id in 1..=5 {
-        store.apply(&batch(heard(id))).await.unwrap();
-    }
-    let query = FrameQuery { page: everything(), ..FrameQuery::default() };
-    let before = (
-        store.frames(&query).await.unwrap(),
-        store.counts().await.unwrap(),
-        store.last_event_seq().await.unwrap(),
-    );
-    store.close().await.unwrap();
-    drop(store);
-    let path = parent.path().join("data").join(DATABASE);
-    let filled = parent.path().join("filled.sqlite3");
-    std::fs::rename(&path, &filled).unwrap();
-    of_the_first_schema(&path, &filled).await;
-
-    let store = reopen(&parent).await.unwrap();
-    let after = (
-        store.frames(&query).await.unwrap(),
-        store.counts().await.unwrap(),
-        store.last_event_seq().await.unwrap(),
-    );
-    assert_eq!(after, before);
-    assert_eq!(store.elements(&Scope::default(), &everything()).await.unwrap(), []);
-    one_of_each(&store).await;
-    assert_eq!(store.pass_elements(1).await.unwrap().len(), 1);
 }

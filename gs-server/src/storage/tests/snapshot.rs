@@ -6,22 +6,22 @@ use mission::{FrameId, Level, Stage, UtcUs};
 use protocol::{Counter, Downlink, Key, Telecommand};
 
 use super::records::*;
-use super::{fresh, reopen};
+use super::{Kind, fresh, reopen};
 
 const HOUR_US: i64 = 3_600_000_000;
 
-#[tokio::test]
-async fn an_empty_folder_gives_an_empty_snapshot() {
-    let (_parent, store) = fresh().await;
+both!(an_empty_folder_gives_an_empty_snapshot);
+async fn an_empty_folder_gives_an_empty_snapshot(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let snapshot = store.snapshot(&[route().satellite], &[key()]).await.unwrap();
     assert_eq!(snapshot.last_ids.frame, 0);
     assert!(snapshot.satellites.is_empty());
     assert_eq!((snapshot.keys[0].counter, snapshot.keys[0].witness.clone()), (None, Witness::Missing));
 }
 
-#[tokio::test]
-async fn everything_that_is_not_over_comes_back() {
-    let (parent, store) = fresh().await;
+both!(everything_that_is_not_over_comes_back);
+async fn everything_that_is_not_over_comes_back(kind: Kind) {
+    let (parent, store) = fresh(kind).await;
     let long = Telecommand::SetAdcsTarget { latitude_deg: 59.9, longitude_deg: 10.7 };
     let records = vec![
         Record::Frame(frame_of(1, &Downlink::Pong, &route())),
@@ -92,9 +92,9 @@ async fn everything_that_is_not_over_comes_back() {
     assert_eq!((snapshot.keys[1].counter, snapshot.keys[1].witness.clone()), (None, Witness::Missing));
 }
 
-#[tokio::test]
-async fn the_higher_of_sealed_frames_and_floors_counts() {
-    let (_parent, store) = fresh().await;
+both!(the_higher_of_sealed_frames_and_floors_counts);
+async fn the_higher_of_sealed_frames_and_floors_counts(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let records = vec![
         Record::Command(command(1, Telecommand::Ping)),
         Record::Sealed(sealed(1, 1, 50)),
@@ -106,9 +106,9 @@ async fn the_higher_of_sealed_frames_and_floors_counts() {
     assert_eq!(snapshot.keys[0].counter, Some(Counter(80)));
 }
 
-#[tokio::test]
-async fn a_damaged_witness_is_told_as_such() {
-    let (_parent, store) = fresh().await;
+both!(a_damaged_witness_is_told_as_such);
+async fn a_damaged_witness_is_told_as_such(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     std::fs::write(store.witness().file(key()), "pixelsat-witness-1 key=").unwrap();
     let snapshot = store.snapshot(&[], &[key()]).await.unwrap();
     assert!(matches!(snapshot.keys[0].witness, Witness::Damaged(_)));

@@ -1,8 +1,8 @@
 //! Values over time: few as they are, many thinned out.
 
 use super::super::*;
-use super::fresh;
 use super::records::*;
+use super::{Kind, fresh};
 use mission::record::{Point, Record, TelemetryRecord};
 use mission::{FrameId, UtcUs};
 
@@ -34,9 +34,9 @@ async fn ask(store: &Store, start_us: i64, stop_us: i64, max_points: u32) -> Sam
     series.samples
 }
 
-#[tokio::test]
-async fn few_values_come_as_they_are() {
-    let (_parent, store) = fresh().await;
+both!(few_values_come_as_they_are);
+async fn few_values_come_as_they_are(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     store_values(&store, &[(30, None), (10, Some(1.5)), (20, Some(-2.0))]).await;
     let sample = |at_us, value| Sample { at_us, value, frame: 1 };
     let all = ask(&store, i64::MIN, i64::MAX, 3).await;
@@ -45,9 +45,9 @@ async fn few_values_come_as_they_are() {
     assert_eq!(ask(&store, 31, 90, 3).await, Samples::Raw(vec![]));
 }
 
-#[tokio::test]
-async fn many_values_come_in_buckets_that_miss_none() {
-    let (_parent, store) = fresh().await;
+both!(many_values_come_in_buckets_that_miss_none);
+async fn many_values_come_in_buckets_that_miss_none(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     let values: Vec<(i64, Option<f64>)> = (0..1000)
         .map(|i| (i * 10, (i % 100 != 7).then_some(if i == 503 { 99.0 } else { f64::from(i as i32 % 10) })))
         .collect();
@@ -75,9 +75,9 @@ async fn many_values_come_in_buckets_that_miss_none() {
     assert_eq!((one.len(), one[0].count), (1, 990));
 }
 
-#[tokio::test]
-async fn the_newest_value_of_each_parameter() {
-    let (_parent, store) = fresh().await;
+both!(the_newest_value_of_each_parameter);
+async fn the_newest_value_of_each_parameter(kind: Kind) {
+    let (_parent, store) = fresh(kind).await;
     for id in [1, 2, 3] {
         store.apply(&batch(heard(id))).await.unwrap();
     }
@@ -103,7 +103,7 @@ async fn the_newest_value_of_each_parameter() {
 #[tokio::test]
 #[ignore = "a figure, not a check"]
 async fn figure_a_year_of_one_parameter() {
-    let (_parent, store) = fresh().await;
+    let (_parent, store) = fresh(Kind::Lite).await;
     store_values(&store, &[]).await;
     for day in 0..365 {
         let frame = frame_of(day + 2, &protocol::Downlink::Pong, &route());
