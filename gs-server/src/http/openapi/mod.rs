@@ -25,9 +25,10 @@ use super::page;
 #[cfg(test)]
 pub(super) use table::table;
 
-const ABOUT: &str = "Ground station and mission control. Reading needs no token, every write needs one and an idempotency \
-    key. Times are RFC 3339 in UTC; unknown is `null`, never 0; units stand in the names. Answers may grow fields: ignore \
-    those you do not know. Every error is a `Problem` with a stable `type`.";
+const ABOUT: &str = "Ground station and mission control. Whoever asks shows a token or a session; while a server is open for \
+    reading, looking needs neither. Every write needs an idempotency key. Times are RFC 3339 in UTC; unknown is null, never \
+    0; units stand in the names. Answers may grow fields: ignore those you do not know. Every error is a Problem with a \
+    stable type.";
 
 const TAGS: [(&str, &str); 7] = [
     ("server", "The program itself"),
