@@ -287,8 +287,7 @@ fn walk(client: &Client, spellings: &[(String, Vec<u8>)], is_empty: bool) {
         // This station has no place and no elements: what is asked of the sky says so.
         let no_sky = answer.status == 409 && answer.text().contains(":no-place");
         // And no plan has run or was rehearsed here.
-        let no_run =
-            answer.status == 404 && (asked.ends_with("/runs/1") || asked.ends_with("/rehearsals/1"));
+        let no_run = answer.status == 404 && (asked.ends_with("/runs/1") || asked.ends_with("/rehearsals/1"));
         // Nothing was laid before a second person; and in an empty archive there is no first of anything.
         let nothing =
             answer.status == 404 && (asked.ends_with("/approvals/1") || is_empty && asked.contains("/1"));
