@@ -13,6 +13,7 @@
 //! | [`PassList`], [`LookList`], [`PassKept`], [`ElementsView`] | what is in the sky, with [`FineTime`] to the microsecond |
 //! | [`ElementsRequest`], [`HeldElements`], [`FetchReport`] | elements: given, held, fetched |
 //! | [`PlanText`], [`PlanView`], [`ScheduleView`], [`RunReport`] | plans, which pass gets which, and what came of it |
+//! | [`AlertView`], [`TargetView`] | what should not be, who knows of it, who is told |
 //! | [`SessionView`], [`UserView`], [`TokenView`] | who may come in |
 //! | [`ApprovalView`], [`TransmissionView`] | what a second person has to approve; who answered for a radiation |
 //! | [`StreamMessage`], [`StreamRequest`] | what the WebSocket says, and what may be said to it |
@@ -27,6 +28,7 @@
 //! What this crate does **not** do: without these features it has no HTTP, no clock and no SQL, and it knows `protocol` only. The server
 //! converts its own types into these.
 
+mod alert;
 mod antenna;
 #[cfg(feature = "client")]
 pub mod client;
@@ -52,6 +54,7 @@ mod telemetry;
 mod time;
 mod version;
 
+pub use alert::{AlertNote, AlertView, AssignRequest, ShelveRequest, TargetTested, TargetView};
 pub use antenna::{AntennaView, AxesView, DopplerView, RigView, RotatorPass, RotatorView};
 pub use command::{CommandRequest, CommandView, GateWord, Outcome, OutcomeWord, StageView};
 pub use download::{DownloadRequest, DownloadView};
@@ -97,7 +100,8 @@ pub use version::{Health, Version};
 pub const API_VERSION: u32 = 1;
 
 /// What this version can do; a client asks for a capability by name, never by version number.
-pub const CAPABILITIES: [&str; 9] = [
+pub const CAPABILITIES: [&str; 10] = [
+    "alerts",
     "archive",
     "commands",
     "downloads",

@@ -195,6 +195,12 @@ kinds! {
     PassRefused 409 "pass-refused" "The plan does not get this pass";
     /// No plan runs at present.
     NothingRuns 409 "nothing-runs" "No plan runs at present";
+    /// The alert is over and known.
+    AlertNotOpen 409 "alert-not-open" "The alert is not open";
+    /// No target of messages has this name.
+    UnknownTarget 404 "unknown-target" "There is no such target";
+    /// A test message did not go through.
+    DeliveryFailed 502 "delivery-failed" "The message did not go through";
     /// Storage takes nothing at present.
     StorageFailing 503 "storage-failing" "Storage is failing";
     /// The station cannot take more at present.

@@ -8,6 +8,7 @@
 //! | [`elements`] | where elements come from: operators, and sources that are asked politely |
 //! | [`hamlib`] | rotator and rig behind hamlib's daemons: clients, and the tasks that follow a satellite |
 //! | [`storage`], [`witness`] | the archive, the reserve, and the counters' witness beside them |
+//! | [`alerts`] | what is wrong, who knows of it and who is told: e-mail, webhooks, chats |
 //! | [`hub`] | committed events on their way to watchers |
 //! | [`http`] | API v1, the stream, the first page |
 //! | [`clock`] | the machine's clock and simulated ones; the only place that reads time or sets a timer |
@@ -28,6 +29,7 @@
 //! What it does **not** do: decide what to send or when (the mission engine does), know the wire format (`protocol`
 //! does) or the module's commands (`radio` does). Tasks and threads are born only here.
 
+pub mod alerts;
 pub mod cli;
 pub mod clock;
 pub mod config;

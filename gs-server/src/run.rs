@@ -22,6 +22,7 @@ use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 
+use crate::alerts::{AlertsParts, AlertsTask, Watched};
 use crate::clock::{ScaledClock, SystemClock, Timer, Wire};
 use crate::config::{Changes, Config, ConfigError, TwoPerson, station_config};
 use crate::elements::task::ElementsTask;
@@ -271,6 +272,7 @@ pub async fn run_with(
     let name = station.station.clone();
     let (place, radios_on_air) = (Place::of(&station), RadioOnAir::of(&station, &config));
     let ids: Vec<LinkId> = station.links.iter().map(|link| link.id.clone()).collect();
+    let watched = Watched::of(&station);
     let (engine, inbox, handle) = Engine::new(EngineParts {
         station,
         snapshot,
@@ -334,8 +336,18 @@ pub async fn run_with(
         });
         sd::tell_systemd(&api, &handle);
     }
+    let (alerts_task, alerts) = AlertsTask::new(AlertsParts {
+        config: &config,
+        watched,
+        store: store.clone(),
+        engine: handle.clone(),
+        hub: hub.clone(),
+        timer: Arc::clone(&timer),
+    })?;
+    alerts_task.spawn(&api);
     let state = HttpState {
         elements,
+        alerts,
         store: store.clone(),
         engine: handle.clone(),
         hub: hub.clone(),

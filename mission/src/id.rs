@@ -135,6 +135,10 @@ number!(
     RunId
 );
 number!(
+    /// An alert, from 1, rising.
+    AlertId
+);
+number!(
     /// A batch of records that is stored whole or not at all; numbered within one life of the process.
     BatchId
 );

@@ -12,6 +12,7 @@
 //!
 //! What it does **not** do: read a clock, open a port, know SQL or HTTP.
 
+pub mod alert;
 pub mod clock;
 pub mod config;
 mod cover;
@@ -36,8 +37,8 @@ pub use clock::{Clock, MonoUs, Now, UtcUs};
 pub use config::{CounterRule, LinkConfig, Profile, SatelliteConfig, StationConfig};
 pub use cover::{Cost, Cover, Range, cheapest_cover};
 pub use id::{
-    AntennaId, BatchId, CommandId, DownloadId, ElementsId, FrameId, ImageId, IntentId, LinkId, PassId,
-    PlanId, PlanName, Principal, RunId, SatelliteId, StationId, TxId,
+    AlertId, AntennaId, BatchId, CommandId, DownloadId, ElementsId, FrameId, ImageId, IntentId, LinkId,
+    PassId, PlanId, PlanName, Principal, RunId, SatelliteId, StationId, TxId,
 };
 pub use intent::{Accepted, CommandIntent, Intent, IntentEnvelope, IntentReceipt, Refusal};
 pub use level::Level;

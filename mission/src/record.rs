@@ -515,11 +515,13 @@ pub enum EventKind {
     Storage,
     /// The station started or stopped.
     Station,
+    /// An alert was raised, changed, was taken note of or is over.
+    Alert,
 }
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::FrameHeard,
         Self::CommandStage,
         Self::ImageDeclared,
@@ -538,6 +540,7 @@ impl EventKind {
         Self::Sealing,
         Self::Storage,
         Self::Station,
+        Self::Alert,
     ];
 
     /// The word in the database and on the wire.
@@ -561,6 +564,7 @@ impl EventKind {
             Self::Sealing => "sealing",
             Self::Storage => "storage",
             Self::Station => "station",
+            Self::Alert => "alert",
         }
     }
 }

@@ -3,6 +3,7 @@
 //! What a script may read goes to standard output (with `--json` as one object, or one object a line); everything said
 //! to a person besides goes to standard error. Exit codes are those of [`Exit`], explained in `docs/cli.md`.
 
+mod alert;
 mod approve;
 mod audit;
 mod backup;
@@ -109,6 +110,9 @@ pub enum Command {
     Hold(hold::Hold),
     /// Give a satellite back to its plan
     Release(hold::Release),
+    /// Alerts: what is wrong, who knows of it, who is told
+    #[command(subcommand, visible_alias = "alerts")]
+    Alert(alert::Alert),
     /// The antenna's rotator by hand, through rotctld
     #[command(subcommand)]
     Rotator(rotator::Rotator),
@@ -173,6 +177,7 @@ impl Cli {
             Command::Look(look) => look.run(),
             Command::Openapi(openapi) => openapi.run(),
             Command::Radio(radio) => radio.run(),
+            Command::Alert(alert) => alert.run(),
             Command::Rotator(rotator) => rotator.run(),
             Command::Rig(rig) => rig.run(),
             Command::Elements(elements) => elements.run(),

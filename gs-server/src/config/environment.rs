@@ -29,3 +29,8 @@ impl Environment {
         Self { listen, data: text("GS_DATA").map(PathBuf::from), log: text("GS_LOG") }
     }
 }
+
+/// A secret that the configuration says stands in the environment; `None` when it is not there, or empty.
+pub(crate) fn secret(name: &str) -> Option<zeroize::Zeroizing<String>> {
+    std::env::var(name).ok().filter(|value| !value.trim().is_empty()).map(zeroize::Zeroizing::new)
+}

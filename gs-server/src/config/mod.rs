@@ -23,6 +23,7 @@
 //! # Ok::<(), gs_server::config::ConfigError>(())
 //! ```
 
+mod alerts;
 mod antenna;
 mod check;
 mod elements;
@@ -40,10 +41,15 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+pub(crate) use alerts::target_url;
+pub use alerts::{
+    AlertsSection, EscalationSection, RuleSection, TargetKind, TargetSection, TransportSecurity,
+};
 pub use antenna::{RigSection, RotatorSection};
 pub(crate) use elements::is_loopback;
 pub use elements::{ElementsSection, FetchSource, MIN_AGE_LEAST_H};
 pub use environment::Environment;
+pub(crate) use environment::secret as environment_secret;
 pub use error::ConfigError;
 pub use links::{AuxInput, LinkKind, LinkSection, ModePinWiring, Phy, UsbId};
 pub use ops::{BackupSection, DiskSection, RetentionSection};
@@ -72,6 +78,9 @@ pub struct Config {
     /// Where elements are fetched from; nowhere by default.
     #[serde(default)]
     pub elements: ElementsSection,
+    /// What is an alert, and who is told.
+    #[serde(default)]
+    pub alerts: AlertsSection,
     /// The antenna's rotator, when there is one.
     #[serde(default)]
     pub rotator: Option<RotatorSection>,
@@ -146,6 +155,8 @@ impl Config {
         let logins = self.elements.fetch.iter_mut().filter_map(|source| source.credentials_file.as_mut());
         let backup = self.backup.as_mut().map(|backup| &mut backup.folder);
         let tls = self.http.tls.iter_mut().flat_map(|tls| [&mut tls.certificate, &mut tls.key]);
+        let secrets = self.alerts.targets.iter_mut().filter_map(|target| target.secret_file.as_mut());
+        let others = others.chain(secrets);
         for path in keys.chain(files).chain(others).chain(logins).chain(backup).chain(tls).chain(password) {
             if path.is_relative() {
                 *path = base.join(&*path);

@@ -70,6 +70,9 @@ impl fmt::Display for Config {
                 None => "no limit on its size".to_owned(),
             },
         )?;
+        for target in &self.alerts.targets {
+            writeln!(f, "alerts to {}: {}", target.name, target.shown())?;
+        }
         for source in &self.elements.fetch {
             writeln!(
                 f,

@@ -32,7 +32,7 @@ pub(super) enum Answer {
 }
 
 /// A client for this address that follows nothing, repeats nothing and gives up after `patience`.
-pub(super) fn http_client(url: &Url, patience: Duration) -> Result<Client, String> {
+pub(crate) fn http_client(url: &Url, patience: Duration) -> Result<Client, String> {
     // The whole process shares one provider; whoever installed another first has chosen.
     if rustls::crypto::CryptoProvider::get_default().is_none() {
         let _ = rustls::crypto::ring::default_provider().install_default();
@@ -55,7 +55,7 @@ pub(super) fn http_client(url: &Url, patience: Duration) -> Result<Client, Strin
 }
 
 /// The error and its reasons; the address is left out, it is said elsewhere.
-pub(super) fn chain(error: &reqwest::Error) -> String {
+pub(crate) fn chain(error: &reqwest::Error) -> String {
     let mut text = String::new();
     let mut reason = error.source();
     while let Some(inner) = reason {

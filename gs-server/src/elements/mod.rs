@@ -30,6 +30,7 @@ pub mod task;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use client::{chain, http_client};
 pub use door::{AddError, Door, held};
 pub use fetcher::{Asker, Fetcher};
 pub use offline::Offline;

@@ -203,6 +203,18 @@ impl Remote {
         self.ask(Method::POST, path, body, PATIENCE).await
     }
 
+    /// As [`Self::write`], with an answer of its own shape.
+    ///
+    /// # Errors
+    /// [`RemoteError`].
+    pub async fn ask_to<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        body: &impl serde::Serialize,
+    ) -> Result<T, RemoteError> {
+        self.ask(Method::POST, path, body, PATIENCE).await
+    }
+
     /// Takes something back.
     ///
     /// # Errors

@@ -11,6 +11,7 @@
 
 mod accept;
 mod admit;
+mod alerts;
 mod antenna;
 mod approvals;
 mod clock;
@@ -64,6 +65,7 @@ use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 use tower_http::compression::CompressionLayer;
 
+use crate::alerts::AlertsHandle;
 use crate::clock::Timer;
 use crate::elements::ElementsHandle;
 use crate::engine::EngineHandle;
@@ -89,6 +91,8 @@ pub struct HttpState {
     pub engine: EngineHandle,
     /// Elements: how satellites are found, and the sources.
     pub elements: ElementsHandle,
+    /// What is wrong, and who is told.
+    pub alerts: AlertsHandle,
     /// Committed events as they come.
     pub hub: Hub,
     /// Rotator and rig, as far as there are any.

@@ -11,9 +11,9 @@ use super::admit::Policy::{Anyone, LoggedIn, Needs};
 use super::admit::{Policy, admit};
 use super::write::{guard_door, guard_write};
 use super::{
-    App, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys, links,
-    metrics, openapi, page, people, plans, rehearsals, runs, schedule, session, sky, station, status, stream,
-    telemetry,
+    App, alerts, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys,
+    links, metrics, openapi, page, people, plans, rehearsals, runs, schedule, session, sky, station, status,
+    stream, telemetry,
 };
 use crate::people::Right::{Approve, Command, Look, ManagePeople, ManageStation, Plan};
 
@@ -152,6 +152,14 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/runs/{id}", Needs(Look), runs::get),
         write("/api/v1/satellites/{name}/hold", Needs(Command), plans::hold),
         write("/api/v1/satellites/{name}/release", Needs(Command), plans::release),
+        read("/api/v1/alerts", Needs(Look), alerts::list),
+        read("/api/v1/alerts/targets", Needs(Look), alerts::targets),
+        write("/api/v1/alerts/targets/{name}/test", Needs(ManageStation), alerts::test),
+        read("/api/v1/alerts/{id}", Needs(Look), alerts::get),
+        write("/api/v1/alerts/{id}/acknowledge", Needs(Command), alerts::acknowledge),
+        write("/api/v1/alerts/{id}/shelve", Needs(Command), alerts::shelve),
+        write("/api/v1/alerts/{id}/unshelve", Needs(Command), alerts::unshelve),
+        write("/api/v1/alerts/{id}/assign", Needs(Command), alerts::assign),
         read("/api/v1/events", Needs(Look), events::list),
         read("/api/v1/limits", Needs(Look), events::limits),
         read("/api/v1/audit", Needs(Look), events::audit),

@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub enum Right {
     /// See everything that was heard, sent and planned.
     Look,
-    /// Ask for telecommands and downloads, take them back, arm links, vouch for the clock.
+    /// Ask for telecommands and downloads, take them back, arm links, vouch for the clock, take note of alerts.
     Command,
     /// Fire telecommands that are critical.
     Critical,

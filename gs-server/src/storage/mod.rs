@@ -14,6 +14,7 @@
 //!
 //! What it does **not** do: keep keys, know HTTP, delete anything that was heard or sent.
 
+mod alerts;
 mod audit_chain;
 mod backup;
 mod convert;
@@ -50,6 +51,9 @@ use protocol::{Counter, KeyId};
 
 use crate::witness::WitnessFolder;
 
+pub use alerts::{
+    AlertBatch, AlertProgress, AlertQuery, AlertRow, Delivery, DeliveryRow, DeliveryState, FinalRun,
+};
 pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
 pub use backup::{DatabaseFacts, copy_database, examine_database};
 pub use error::StoreError;
@@ -159,12 +163,17 @@ impl Store {
             writer.apply(batch).await
         };
         let (events, head) = stored?;
+        self.tell_audit_head(head);
+        Ok(events)
+    }
+
+    /// Writes down elsewhere where the audit ends, when it has grown.
+    fn tell_audit_head(&self, head: Option<AuditHead>) {
         if let Some(head) = head {
             // Nobody waits for it: the chain itself is in the database.
             let file = Arc::clone(&self.0.audit_head);
             tokio::task::spawn_blocking(move || file.raise(head));
         }
-        Ok(events)
     }
 
     /// What the engine needs to go on: of these satellites and keys, and the highest ids of everything.

@@ -14,7 +14,7 @@ use super::rows::{
     ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::write::Transaction;
-use super::{Store, StoreError};
+use super::{AlertRow, DeliveryRow, Store, StoreError};
 
 /// Frames in one transaction: some thousand rows, some ten milliseconds.
 const FRAMES_PER_STEP: i64 = 200;
@@ -229,6 +229,8 @@ async fn verify_the_rest(store: &Store, report: &mut RedecodeReport) -> Result<(
     verify::<EventRow>(store, report).await?;
     verify::<AuditRow>(store, report).await?;
     verify::<AuditLinkRow>(store, report).await?;
+    verify::<AlertRow>(store, report).await?;
+    verify::<DeliveryRow>(store, report).await?;
     verify::<IntentRow>(store, report).await
 }
 

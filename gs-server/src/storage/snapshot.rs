@@ -83,15 +83,15 @@ fn is_empty(left: &SatelliteSnapshot) -> bool {
 /// The ids that this station gives: an id holds the station's number in its upper bits, so that stations which share a
 /// database never give the same. What another station is doing is its own affair: a restart goes on with ours.
 #[derive(Debug, Clone, Copy)]
-struct Own {
+pub(super) struct Own {
     /// Below the first.
-    after: i64,
+    pub(super) after: i64,
     /// Above the last.
-    before: i64,
+    pub(super) before: i64,
 }
 
 impl Own {
-    const fn of(number: i64) -> Self {
+    pub(super) const fn of(number: i64) -> Self {
         Self { after: number << STATION_SHIFT, before: (number + 1) << STATION_SHIFT }
     }
 }

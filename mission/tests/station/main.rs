@@ -7,6 +7,7 @@
     reason = "a test that cannot be set up has failed"
 )]
 
+mod alerts;
 mod at_most_once;
 mod chaos;
 mod clocks;

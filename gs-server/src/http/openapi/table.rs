@@ -47,6 +47,7 @@ pub(in crate::http) fn table() -> Vec<Doc> {
     rows.extend(uplink());
     rows.extend(sky());
     rows.extend(plans());
+    rows.extend(super::alerts::alerts());
     rows.extend(super::people::rehearsals());
     rows.extend(super::people::people());
     rows

@@ -1,4 +1,5 @@
 // The first page: reads, follows the stream, paints what it knows.
+import { paintAlerts, refreshAlerts } from "./alerts.js";
 import { get } from "./api.js";
 import { paintCommands, refreshCommands, wireHands } from "./commands.js";
 import { addEvent, resetEvents } from "./events.js";
@@ -22,6 +23,7 @@ function paint() {
   paintHeartbeat();
   paintCommands();
   paintLinks();
+  paintAlerts();
   paintNotice();
 }
 
@@ -41,6 +43,7 @@ function onEvent(event) {
   addEvent(event);
   if (event.kind === "frame-heard") refreshHeartbeat();
   if (event.kind === "command-stage") refreshCommands();
+  if (event.kind === "alert") refreshAlerts();
   if (event.image !== null) refreshPicture();
 }
 
@@ -48,6 +51,7 @@ function refreshAll() {
   refreshHeartbeat();
   refreshCommands();
   refreshPicture();
+  refreshAlerts();
 }
 
 async function begin() {

@@ -1,5 +1,6 @@
 //! A real store in a temporary folder and a real engine, heard by a satellite made of bytes.
 
+mod alerts;
 mod client;
 mod elements;
 mod openapi;
@@ -35,6 +36,7 @@ use tokio_util::sync::CancellationToken;
 use tower::ServiceExt as _;
 
 use super::{AllowedHosts, HttpState, Identity, Token, router, serve};
+use crate::alerts::{AlertsHandle, AlertsParts, AlertsTask, Watched};
 use crate::clock::{SystemClock, Timer, wall_sleep};
 use crate::config::ClockSetting;
 use crate::elements::{ElementsHandle, Wanted};
@@ -57,7 +59,10 @@ struct Bench {
     people: People,
     /// The clock of people.
     hands: Arc<Hands>,
-    _folder: TempDir,
+    alerts: AlertsHandle,
+    /// Until it is started.
+    alerts_task: Option<AlertsTask>,
+    folder: TempDir,
 }
 
 impl Drop for Bench {
@@ -79,14 +84,27 @@ impl Bench {
     async fn with_people(rules: impl FnOnce(&mut PeopleSettings)) -> Self {
         let mut settings = people_settings();
         rules(&mut settings);
-        Self::built(station(), HOST.parse().unwrap(), settings).await
+        Self::built(station(), HOST.parse().unwrap(), settings, "").await
+    }
+
+    /// A bench that watches itself, with these targets (TOML).
+    async fn watching(targets: &str) -> Self {
+        let mut bench = Self::built(station(), HOST.parse().unwrap(), people_settings(), targets).await;
+        let task = bench.alerts_task.take().unwrap();
+        task.spawn(&crate::lifecycle::Lifecycle::new(&bench.stop));
+        bench
     }
 
     async fn listening(station: StationConfig, address: std::net::SocketAddr) -> Self {
-        Self::built(station, address, people_settings()).await
+        Self::built(station, address, people_settings(), "").await
     }
 
-    async fn built(station: StationConfig, address: std::net::SocketAddr, settings: PeopleSettings) -> Self {
+    async fn built(
+        station: StationConfig,
+        address: std::net::SocketAddr,
+        settings: PeopleSettings,
+        targets: &str,
+    ) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(StoreOptions {
             folder: folder.path().join("data"),
@@ -104,6 +122,8 @@ impl Bench {
         let snapshot = store.snapshot(&satellites, &keys).await.unwrap();
         let (port, mut link) = LinkPort::new(LinkId::new("e22").unwrap());
         let identity = Identity::of(&station, true);
+        let watched = Watched::of(&station);
+        let config = configuration(folder.path(), targets);
         let (engine, inbox, handle) = Engine::new(EngineParts {
             station,
             snapshot,
@@ -128,7 +148,17 @@ impl Bench {
             norad_cat_id: Some(25_544),
             object_name: None,
         }];
+        let (alerts_task, alerts) = AlertsTask::new(AlertsParts {
+            config: &config,
+            watched,
+            store: store.clone(),
+            engine: handle.clone(),
+            hub: hub.clone(),
+            timer: Arc::clone(&timer),
+        })
+        .unwrap();
         let state = HttpState {
+            alerts: alerts.clone(),
             elements: ElementsHandle::without_sources(wanted, Arc::clone(&timer)),
             store: store.clone(),
             engine: handle,
@@ -149,7 +179,9 @@ impl Bench {
             stop: stop.clone(),
         };
         let router = router(state, AllowedHosts::new(address, &[HOST.to_owned()]));
-        let bench = Self { router, store, hub, inbox, stop, timer, people, hands, _folder: folder };
+        let alerts_task = Some(alerts_task);
+        let bench =
+            Self { router, store, hub, inbox, stop, timer, people, hands, alerts, alerts_task, folder };
         // The engine tells that it began; tests count from there.
         for _ in 0..500 {
             if bench.store.last_event_seq().await.unwrap() == 1 {
@@ -193,6 +225,26 @@ impl Bench {
         let mut request = write(path, key).body(Body::empty()).unwrap();
         *request.method_mut() = Method::DELETE;
         self.send(request).await
+    }
+
+    /// An event as the engine stores one.
+    async fn hub_event(&self, level: mission::Level) {
+        use mission::record::{EventKind, EventRecord, Record, Subject};
+        let record = Record::Event(EventRecord {
+            at: self.timer.now().utc,
+            kind: EventKind::Link,
+            level,
+            satellite: None,
+            station: StationId::new("bench").unwrap(),
+            link: Some(LinkId::new("e22").unwrap()),
+            key: None,
+            subject: Subject::default(),
+            message: "link e22 is strange".to_owned(),
+        });
+        let batch = mission::Batch { id: mission::BatchId(1), records: vec![record] };
+        for event in self.store.apply(&batch).await.unwrap() {
+            self.hub.publish(event);
+        }
     }
 
     /// Bytes as a radio hands them over.
@@ -300,6 +352,17 @@ fn write(path: &str, key: &str) -> axum::http::request::Builder {
         .header(header::AUTHORIZATION, format!("Bearer {TOKEN}"))
         .header(header::CONTENT_TYPE, "application/json")
         .header("idempotency-key", key)
+}
+
+/// A configuration for those who want one; the engine gets [`station`].
+fn configuration(folder: &std::path::Path, targets: &str) -> crate::config::Config {
+    let text = format!(
+        "[station]\nname = \"bench\"\n[[satellites]]\nname = \"pixelsat-1\"\n[[links]]\nname = \"e22\"\n\
+         satellite = \"pixelsat-1\"\nkind = \"tcp\"\nconnect = \"localhost:9\"\nsimulated = true\n\
+         [storage]\nfolder = \"data\"\n{targets}\n\
+         [[alerts.rules]]\nkind = \"disk\"\nenabled = false\n[[alerts.rules]]\nkind = \"link\"\nenabled = false\n"
+    );
+    crate::config::Config::from_toml(&text, folder).unwrap()
 }
 
 fn station() -> StationConfig {

@@ -56,7 +56,7 @@ pub struct Scope {
 
 /// A list with conditions; values are bound, never written into the statement.
 pub(super) struct List {
-    statement: Builder,
+    pub(super) statement: Builder,
 }
 
 impl List {
@@ -78,7 +78,7 @@ impl List {
         self
     }
 
-    fn any_of(mut self, column: &'static str, words: Option<Vec<&'static str>>) -> Self {
+    pub(super) fn any_of(mut self, column: &'static str, words: Option<Vec<&'static str>>) -> Self {
         if let Some(words) = words {
             self.statement.push(format_args!(" and {column} in ("));
             for (at, word) in words.into_iter().enumerate() {
@@ -116,7 +116,11 @@ impl List {
 }
 
 /// At most one row.
-async fn one<R: Row>(store: &Store, condition: &'static str, id: i64) -> Result<Option<R>, StoreError> {
+pub(super) async fn one<R: Row>(
+    store: &Store,
+    condition: &'static str,
+    id: i64,
+) -> Result<Option<R>, StoreError> {
     let row = sql(super::row::select::<R>(condition)).bind(id).fetch_optional(&store.0.readers).await?;
     row.as_ref().map(R::read).transpose()
 }

@@ -18,6 +18,7 @@ macro_rules! both {
     };
 }
 
+mod alerts;
 mod audit;
 mod conformance;
 mod damage;

@@ -26,14 +26,14 @@ const ROWS_PER_STATEMENT: usize = 500;
 /// A transaction that is open.
 pub(in crate::storage) struct Transaction<'a> {
     pub(in crate::storage) connection: &'a mut Connection,
-    pub(super) station: &'a StationId,
+    pub(in crate::storage) station: &'a StationId,
     pub(super) memory: &'a mut Memory,
     /// Which server this is, when several share the database.
     pub(super) fence: Option<&'a Fence>,
 }
 
 impl Transaction<'_> {
-    pub(super) async fn batch(&mut self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
+    pub(in crate::storage) async fn batch(&mut self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
         let mut events = Vec::new();
         for record in &batch.records {
             events.extend(self.write(record, batch).await?);

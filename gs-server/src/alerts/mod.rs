@@ -1,0 +1,32 @@
+//! Alerts: what should not be, who knows of it, and who is told.
+//!
+//! [`mission::alert`] decides; here is its shell: a task that looks at the station ([`AlertsHandle`] is its door), keeps
+//! what has changed, and one outbox for each target, which sends what is kept.
+//!
+//! | file | what |
+//! | --- | --- |
+//! | `task` | looks every two seconds, keeps, answers operators |
+//! | `gather` | what the station's status does not tell: disk, clock, limits, passes |
+//! | `message` | alerts in words |
+//! | `outbox` | one for each target: sends, tries again, makes digests |
+//! | `target` | e-mail, webhook, Matrix, Slack, Discord: one attempt each |
+//!
+//! A message is durable before it is sent, and carries a number that is the same in each attempt: after a crash it may
+//! come twice, and whoever gets it can tell.
+
+mod gather;
+mod handle;
+mod message;
+mod outbox;
+mod target;
+mod task;
+
+#[cfg(test)]
+pub(crate) mod catchers;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use gather::Watched;
+pub use handle::{Acted, Action, ActionFailure, AlertsHandle, TargetNow, TestFailure};
+pub(crate) use message::shape;
+pub(crate) use task::{AlertsParts, AlertsTask};
