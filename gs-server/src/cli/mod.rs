@@ -22,6 +22,7 @@ mod plans;
 mod radio;
 mod redecode;
 mod rehearse;
+mod report;
 mod rig;
 mod rotator;
 mod runs;
@@ -109,6 +110,9 @@ pub enum Command {
     Hold(hold::Hold),
     /// Give a satellite back to its plan
     Release(hold::Release),
+    /// What a pass brought, what the next shift must know, what a month came to
+    #[command(subcommand)]
+    Report(report::Report),
     /// The antenna's rotator by hand, through rotctld
     #[command(subcommand)]
     Rotator(rotator::Rotator),
@@ -192,6 +196,7 @@ impl Cli {
             Command::Approvals(approvals) => approvals.run(),
             Command::Approve(approve) => approve.run(),
             Command::Refuse(refuse) => refuse.run(),
+            Command::Report(report) => report.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

@@ -34,6 +34,7 @@ mod plans;
 mod problem;
 mod rehearsals;
 mod release;
+mod reports;
 mod routes;
 mod runs;
 mod schedule;
