@@ -16,6 +16,7 @@
 //! | [`AlertView`], [`TargetView`] | what should not be, who knows of it, who is told |
 //! | [`SessionView`], [`UserView`], [`TokenView`] | who may come in |
 //! | [`ApprovalView`], [`TransmissionView`] | what a second person has to approve; who answered for a radiation |
+//! | [`PassReport`], [`HandoverReport`], [`MonthReport`] | what a pass brought, what the next shift must know, what a month came to |
 //! | [`StreamMessage`], [`StreamRequest`] | what the WebSocket says, and what may be said to it |
 //! | [`Problem`] | what went wrong (RFC 9457), each kind with a stable `type` |
 //!
@@ -45,10 +46,12 @@ mod people;
 mod plan;
 mod problem;
 mod rehearsal;
+mod report;
 mod run;
 mod sky;
 mod station;
 mod stream;
+mod summary;
 pub mod telecommand;
 mod telemetry;
 mod time;
@@ -79,6 +82,10 @@ pub use rehearsal::{
     Percentiles, RehearsalAnswer, RehearsalRequest, RehearsalView, RehearsedEnd, RehearsedFigures,
     RehearsedPass, RehearsedRun, RehearsedStep,
 };
+pub use report::{
+    AlarmReported, ChunkRun, CommandReported, HadPass, ImageReported, PacketCount, PassReport, PathPoint,
+    PlannedPass, RunReported, SignalPoint, SilentStretch, Spread, UplinkReported,
+};
 pub use run::{
     AttachRequest, ClosedView, ContactView, OpenView, PlanView, RefusedView, RivalView, RunReport, RunView,
     ScheduleView, StepReport,
@@ -91,6 +98,9 @@ pub use station::{
     ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView,
 };
 pub use stream::{StreamMessage, StreamRequest, StreamValue, Topic, UnknownTopic};
+pub use summary::{
+    DayCount, HandoverReport, IncidentCount, MonthOfSatellite, MonthReport, PassBrief, WordCount,
+};
 pub use telecommand::ArgumentError;
 pub use telemetry::{Bucket, LatestValue, ParameterView, Sample, TelemetryPage};
 pub use time::{Time, TimeError};

@@ -22,6 +22,7 @@
 //! | [`people`] | who may do what |
 //! | `schedule` | a schedule in the words of the API |
 //! | `rehearsed` | what a rehearsal came to, in the words of the API |
+//! | [`report`] | what a pass brought, what the next shift must know: values, pages, texts |
 //! | `pointing` | whom the antenna follows, by the schedule |
 //! | [`ops`] | backups, and what else keeps a server running for years |
 //! | [`cli`] | the command line, a file per verb |
@@ -50,6 +51,7 @@ pub mod people;
 pub mod plan;
 mod pointing;
 mod rehearsed;
+pub mod report;
 pub mod run;
 mod schedule;
 pub mod sky;

@@ -40,6 +40,7 @@ use crate::links::{self, LinkParts};
 use crate::ops::{sd, upkeep::UpkeepTask};
 use crate::people::{People, PeopleSettings};
 use crate::pointing::{Place, Steering};
+use crate::report::ReportTask;
 use crate::storage::reserve::ReserveError;
 use crate::storage::{EventQuery, Page, Postgres, Store, StoreError, StoreOptions};
 
@@ -345,6 +346,7 @@ pub async fn run_with(
         timer: Arc::clone(&timer),
     })?;
     alerts_task.spawn(&api);
+    reports(&config, &identity, &store, &timer, &hub, &api);
     let state = HttpState {
         elements,
         alerts,
@@ -608,6 +610,32 @@ fn elements(
         Ok(())
     });
     Ok(handle)
+}
+
+/// The report of each pass as a file, unless nobody wants them.
+fn reports(
+    config: &Config,
+    identity: &Identity,
+    store: &Store,
+    timer: &Arc<dyn Timer>,
+    hub: &Hub,
+    api: &Lifecycle,
+) {
+    if !config.reports.passes {
+        return;
+    }
+    let task = ReportTask {
+        store: store.clone(),
+        identity: identity.clone(),
+        timer: Arc::clone(timer),
+        hub: hub.clone(),
+        folder: config.reports.folder.clone().unwrap_or_else(|| store.folder().join("reports")),
+    };
+    let stop = api.soft.clone();
+    api.spawn("reports", async move {
+        task.run(stop).await;
+        Ok(())
+    });
 }
 
 /// Rotator and rig, and who steers them. They live and die with the links: whatever ends the server parks the antenna.

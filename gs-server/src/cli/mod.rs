@@ -23,6 +23,7 @@ mod plans;
 mod radio;
 mod redecode;
 mod rehearse;
+mod report;
 mod rig;
 mod rotator;
 mod runs;
@@ -113,6 +114,9 @@ pub enum Command {
     /// Alerts: what is wrong, who knows of it, who is told
     #[command(subcommand, visible_alias = "alerts")]
     Alert(alert::Alert),
+    /// What a pass brought, what the next shift must know, what a month came to
+    #[command(subcommand)]
+    Report(report::Report),
     /// The antenna's rotator by hand, through rotctld
     #[command(subcommand)]
     Rotator(rotator::Rotator),
@@ -197,6 +201,7 @@ impl Cli {
             Command::Approvals(approvals) => approvals.run(),
             Command::Approve(approve) => approve.run(),
             Command::Refuse(refuse) => refuse.run(),
+            Command::Report(report) => report.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

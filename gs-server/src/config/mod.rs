@@ -32,6 +32,7 @@ mod error;
 mod links;
 mod ops;
 mod reload;
+mod reports;
 mod satellites;
 mod server;
 mod station;
@@ -54,6 +55,7 @@ pub use error::ConfigError;
 pub use links::{AuxInput, LinkKind, LinkSection, ModePinWiring, Phy, UsbId};
 pub use ops::{BackupSection, DiskSection, RetentionSection};
 pub use reload::Changes;
+pub use reports::ReportsSection;
 pub use satellites::{CounterSetting, LimitSection, SatelliteSection, Thresholds};
 pub use server::{
     ClockSetting, HttpSection, LogSection, PeopleSection, SimulationSection, StationSection, StorageSection,
@@ -87,6 +89,9 @@ pub struct Config {
     /// A rig that is tuned with the Doppler shift, when there is one.
     #[serde(default)]
     pub rig: Option<RigSection>,
+    /// What is written down without being asked.
+    #[serde(default)]
+    pub reports: ReportsSection,
     /// Who may talk to the server, and where.
     #[serde(default)]
     pub http: HttpSection,
@@ -150,7 +155,10 @@ impl Config {
     fn anchor_paths(&mut self, base: &Path) {
         let keys = self.satellites.iter_mut().filter_map(|satellite| satellite.key_file.as_mut());
         let files = self.links.iter_mut().filter_map(|link| link.file.as_mut());
-        let others = [&mut self.storage.folder].into_iter().chain(self.http.token_file.as_mut());
+        let others = [&mut self.storage.folder]
+            .into_iter()
+            .chain(self.http.token_file.as_mut())
+            .chain(self.reports.folder.as_mut());
         let password = self.storage.password_file.as_mut();
         let logins = self.elements.fetch.iter_mut().filter_map(|source| source.credentials_file.as_mut());
         let backup = self.backup.as_mut().map(|backup| &mut backup.folder);

@@ -35,6 +35,7 @@ mod plans;
 mod problem;
 mod rehearsals;
 mod release;
+mod reports;
 mod routes;
 mod runs;
 mod schedule;

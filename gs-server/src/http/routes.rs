@@ -12,8 +12,8 @@ use super::admit::{Policy, admit};
 use super::write::{guard_door, guard_write};
 use super::{
     App, alerts, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys,
-    links, metrics, openapi, page, people, plans, rehearsals, runs, schedule, session, sky, station, status,
-    stream, telemetry,
+    links, metrics, openapi, page, people, plans, rehearsals, reports, runs, schedule, session, sky, station,
+    status, stream, telemetry,
 };
 use crate::people::Right::{Approve, Command, Look, ManagePeople, ManageStation, Plan};
 
@@ -150,6 +150,11 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/schedule", Needs(Look), schedule::get),
         read("/api/v1/runs", Needs(Look), runs::list),
         read("/api/v1/runs/{id}", Needs(Look), runs::get),
+        read("/api/v1/reports/passes/{id}", Needs(Look), reports::pass),
+        read("/api/v1/reports/handover", Needs(Look), reports::handover),
+        read("/api/v1/reports/handover.html", Needs(Look), reports::handover_page),
+        read("/api/v1/reports/handover.md", Needs(Look), reports::handover_text),
+        read("/api/v1/reports/months/{month}", Needs(Look), reports::month),
         write("/api/v1/satellites/{name}/hold", Needs(Command), plans::hold),
         write("/api/v1/satellites/{name}/release", Needs(Command), plans::release),
         read("/api/v1/alerts", Needs(Look), alerts::list),

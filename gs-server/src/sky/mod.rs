@@ -10,7 +10,8 @@
 //! | `row` | one pass or look of `tle` to its words on the wire |
 //! | `track` | a pass as points for a plot |
 //! | `plot`, `timeline` | [`sky_plot_svg`], [`timeline_svg`] |
-//! | `theme` | a drawing in the dark or the light colours |
+//! | `theme` | a drawing in the dark or the light colours, or in those of the page around it |
+//! | `svg` | the canvas of all drawings, reports' too |
 //! | `calendar` | [`icalendar`] |
 //! | `table` | passes and looks for people |
 
@@ -21,7 +22,7 @@ mod plot;
 mod predict;
 mod row;
 mod source;
-mod svg;
+pub(crate) mod svg;
 mod table;
 mod theme;
 mod timeline;
@@ -35,6 +36,6 @@ pub use predict::{PASSES_MAX, PredictError, Prediction, predict};
 pub use row::{elements_of, elements_view, fine_time, instant, pass_view};
 pub use source::{Catalogue, Object};
 pub use table::{look_table, pass_table};
-pub use theme::Theme;
+pub use theme::{Theme, with_tokens};
 pub use timeline::{Timeline, timeline_svg, timeline_svg_of_width};
 pub use track::{SkyTrack, TrackPoint};

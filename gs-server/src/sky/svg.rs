@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontDesc, FontFamily, FontStyle, RGBAColor, ShapeStyle, TextStyle};
 
 /// The one file that has colours.
-pub(super) const TOKENS: &str = include_str!("../http/page/tokens.css");
+pub(crate) const TOKENS: &str = include_str!("../http/page/tokens.css");
 /// The backend knows whole numbers only; so many of them make a pixel.
 const UNITS_PER_PX: f64 = 16.0;
 /// The backend writes a font as so much smaller than it was asked for.
@@ -19,10 +19,10 @@ const FONT_FACTOR: f64 = 1.24;
 const TEXT_MAX: usize = 120;
 
 /// A point, in pixels from the upper left.
-pub(super) type Px = (f64, f64);
+pub(crate) type Px = (f64, f64);
 
 /// A token's colour in the dark theme; the text colour for one that is not there.
-pub(super) fn token(name: &str) -> RGBAColor {
+pub(crate) fn token(name: &str) -> RGBAColor {
     let value = |name: &str| {
         TOKENS.lines().find_map(|line| {
             let value = line.trim().strip_prefix("--")?.strip_prefix(name)?.strip_prefix(':')?;
@@ -37,14 +37,14 @@ pub(super) fn token(name: &str) -> RGBAColor {
 
 /// Which point of a text lies at its place.
 #[derive(Clone, Copy)]
-pub(super) enum Anchor {
+pub(crate) enum Anchor {
     Left,
     Middle,
     Right,
 }
 
 /// What is drawn on.
-pub(super) struct Canvas<'a> {
+pub(crate) struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
     is_whole: Cell<bool>,
     /// How much larger texts are than they say.
@@ -52,26 +52,26 @@ pub(super) struct Canvas<'a> {
 }
 
 /// What shows of a picture; of one that is shown small, a part with larger texts.
-pub(super) struct Part {
+pub(crate) struct Part {
     /// The whole picture.
-    pub(super) size_px: (u32, u32),
+    pub(crate) size_px: (u32, u32),
     /// Upper left corner of the part.
-    pub(super) corner_px: (u32, u32),
+    pub(crate) corner_px: (u32, u32),
     /// Size of the part.
-    pub(super) part_px: (u32, u32),
+    pub(crate) part_px: (u32, u32),
     /// How much larger texts are.
-    pub(super) text_scale: f64,
+    pub(crate) text_scale: f64,
 }
 
 impl Part {
     /// All of a picture of so many pixels.
-    pub(super) fn whole(size_px: (u32, u32)) -> Self {
+    pub(crate) fn whole(size_px: (u32, u32)) -> Self {
         Self { size_px, corner_px: (0, 0), part_px: size_px, text_scale: 1.0 }
     }
 }
 
 /// Draws a picture on the console's ground. `title` is read aloud and shown where a pointer rests.
-pub(super) fn svg(part: &Part, title: &str, draw: impl FnOnce(&Canvas<'_>)) -> String {
+pub(crate) fn svg(part: &Part, title: &str, draw: impl FnOnce(&Canvas<'_>)) -> String {
     let units = |px: u32| px.saturating_mul(UNITS_PER_PX as u32);
     let (width, height) = (units(part.size_px.0), units(part.size_px.1));
     let mut text = String::new();
@@ -122,7 +122,7 @@ impl Canvas<'_> {
         self.done(|| self.area.draw(element));
     }
 
-    pub(super) fn line(&self, points: &[Px], colour: RGBAColor, width_px: f64) {
+    pub(crate) fn line(&self, points: &[Px], colour: RGBAColor, width_px: f64) {
         if points.len() > 1 {
             self.draw(&PathElement::new(
                 points.iter().map(units).collect::<Vec<_>>(),
@@ -131,26 +131,26 @@ impl Canvas<'_> {
         }
     }
 
-    pub(super) fn polygon(&self, points: &[Px], colour: RGBAColor) {
+    pub(crate) fn polygon(&self, points: &[Px], colour: RGBAColor) {
         if points.len() > 2 {
             self.draw(&Polygon::new(points.iter().map(units).collect::<Vec<_>>(), colour.filled()));
         }
     }
 
-    pub(super) fn rectangle(&self, from: Px, to: Px, colour: RGBAColor) {
+    pub(crate) fn rectangle(&self, from: Px, to: Px, colour: RGBAColor) {
         self.draw(&Rectangle::new([units(&from), units(&to)], colour.filled()));
     }
 
-    pub(super) fn disc(&self, centre: Px, radius_px: f64, colour: RGBAColor) {
+    pub(crate) fn disc(&self, centre: Px, radius_px: f64, colour: RGBAColor) {
         self.draw(&Circle::new(units(&centre), unit(radius_px), colour.filled()));
     }
 
-    pub(super) fn ring(&self, centre: Px, radius_px: f64, colour: RGBAColor, width_px: f64) {
+    pub(crate) fn ring(&self, centre: Px, radius_px: f64, colour: RGBAColor, width_px: f64) {
         self.draw(&Circle::new(units(&centre), unit(radius_px), stroke(colour, width_px)));
     }
 
     /// Text whose middle line lies at `at`.
-    pub(super) fn text(&self, text: &str, at: Px, anchor: Anchor, size_px: f64, colour: RGBAColor) {
+    pub(crate) fn text(&self, text: &str, at: Px, anchor: Anchor, size_px: f64, colour: RGBAColor) {
         let font = FontDesc::new(
             FontFamily::SansSerif,
             size_px * self.text_scale * UNITS_PER_PX * FONT_FACTOR,

@@ -48,9 +48,23 @@ fn colours(css: &'static str) -> impl Iterator<Item = (&'static str, &'static st
     })
 }
 
-/// In one walk, so that no colour is exchanged twice.
+/// A drawing that was made with the dark tokens, in whatever colours the page around it gives to the tokens: for drawings
+/// that stand in a page, which change with its theme.
+#[must_use]
+pub fn with_tokens(svg: &str) -> String {
+    let dark = TOKENS.split_once("prefers-color-scheme: light").map_or(TOKENS, |(dark, _)| dark);
+    let tokens: Vec<_> =
+        colours(dark).map(|(name, colour)| (colour, format!("var(--{name}, {colour})"))).collect();
+    replace(svg, &tokens)
+}
+
 fn exchange(svg: &str) -> String {
-    let pairs = pairs();
+    let pairs: Vec<_> = pairs().into_iter().map(|(dark, light)| (dark, light.to_owned())).collect();
+    replace(svg, &pairs)
+}
+
+/// In one walk, so that no colour is exchanged twice.
+fn replace(svg: &str, pairs: &[(&str, String)]) -> String {
     let mut out = String::with_capacity(svg.len());
     let mut rest = svg;
     while let Some(at) = rest.find("=\"#") {
@@ -60,8 +74,8 @@ fn exchange(svg: &str) -> String {
             rest = colour;
             continue;
         };
-        let light = pairs.iter().find(|(dark, _)| dark.eq_ignore_ascii_case(found));
-        out.push_str(light.map_or(found, |(_, light)| light));
+        let other = pairs.iter().find(|(known, _)| known.eq_ignore_ascii_case(found));
+        out.push_str(other.map_or(found, |(_, other)| other));
         rest = &colour[7..];
     }
     out.push_str(rest);

@@ -4,10 +4,10 @@
 use api::ProblemKind as K;
 use api::{
     AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, DownloadRequest,
-    DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView, Health,
-    HeldElements, ImageView, LatestValue, LimitView, LookList, Nothing, Outcome, ParameterView, PassKept,
-    PassList, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, StreamMessage,
-    StreamRequest, TelemetryPage, Version,
+    DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView,
+    HandoverReport, Health, HeldElements, ImageView, LatestValue, LimitView, LookList, MonthReport, Nothing,
+    Outcome, ParameterView, PassKept, PassList, PassReport, PlanText, PlanView, RunReport, RunView,
+    ScheduleView, StationView, StreamMessage, StreamRequest, TelemetryPage, Version,
 };
 
 use super::operation::{Doc, Kind, Param, delete, get, param, post, required};
@@ -35,6 +35,8 @@ const MIN_ELEVATION: Param = param(
 const FREQUENCY: Param = param("frequency", Kind::Number(1e5, 1e12), "For Doppler shifts, Hz.");
 const FORM: Param = param("form", Kind::OneOf(&["full", "compact"]), "With or without what surrounds it.");
 const THEME: Param = param("theme", Kind::OneOf(&["dark", "light"]), "Colours; `dark` when left out.");
+
+const SINCE: Param = param("since", Kind::Time, "Since when; the last eight hours when left out.");
 
 pub(super) const INTENT: [K; 3] = [K::StorageFailing, K::Overloaded, K::Stopping];
 const SKY: [K; 4] = [K::NoPlace, K::NoElements, K::UnknownSatellite, K::NotFound];
@@ -366,6 +368,27 @@ fn plans() -> Vec<Doc> {
         get("/api/v1/runs/{id}", "plans", "get_run", "The report of one run")
             .json::<RunReport>()
             .problems(&[K::NotFound]),
+        get("/api/v1/reports/passes/{id}", "plans", "pass_report", "What a pass brought")
+            .more("With `.html` behind the number as a page, with `.md` as Markdown.")
+            .json::<PassReport>()
+            .problems(&[K::NotFound]),
+        get("/api/v1/reports/handover", "plans", "handover", "What the next shift must know")
+            .query(&[SINCE])
+            .json::<HandoverReport>(),
+        get("/api/v1/reports/handover.html", "plans", "handover_page", "The same as a page")
+            .query(&[SINCE])
+            .media("text/html; charset=utf-8"),
+        get("/api/v1/reports/handover.md", "plans", "handover_text", "The same as Markdown")
+            .query(&[SINCE])
+            .media("text/markdown; charset=utf-8"),
+        get(
+            "/api/v1/reports/months/{month}",
+            "plans",
+            "month_report",
+            "What a month such as 2026-11 came to",
+        )
+        .more("With `.html` behind the month as a page, with `.md` as Markdown.")
+        .json::<MonthReport>(),
         post("/api/v1/satellites/{name}/hold", "plans", "hold", "Take over from the plan that runs")
             .body::<Nothing>()
             .json::<Outcome>()

@@ -10,6 +10,7 @@ mod people;
 mod plans;
 mod reads;
 mod rehearsals;
+mod reports;
 mod security;
 mod sky;
 mod stream;

@@ -18,6 +18,8 @@ async fn every_file_that_the_page_names_is_served_with_its_type() {
     }
     // From each page the other is a click away.
     assert!(texts.iter().take(2).all(|text| text.contains("href=\"/\"") && text.contains("href=\"/plan\"")));
+    // What links the pages of reports have.
+    texts.push(include_str!("../../report/html.rs").to_owned());
     texts.extend(FILES.iter().map(|(_, text)| (*text).to_owned()));
     for (name, _) in FILES {
         let file = bench.get(&format!("/page/{name}")).await;

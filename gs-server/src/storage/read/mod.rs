@@ -7,7 +7,9 @@ mod events;
 mod frames;
 mod images;
 mod plans;
+mod reports;
 mod sky;
+mod summary;
 mod telemetry;
 
 pub use commands::{CommandLife, CommandNow, CommandQuery};
@@ -15,6 +17,8 @@ pub use events::{Counts, EventQuery};
 pub use frames::{FrameQuery, Heard};
 pub use images::{ChunkState, ImageBytes, ImageMap};
 pub use plans::HeardCounts;
+pub use reports::{ChunkCame, CommandThen, Span};
+pub use summary::{EventCount, FrameCount};
 pub use telemetry::{Bucket, LatestValue, Sample, Samples, Series, TelemetryQuery};
 
 pub(super) use events::find_intent;

@@ -29,6 +29,7 @@ mod plans;
 mod records;
 mod redecode;
 mod refusals;
+mod reports;
 mod shared;
 mod sky;
 mod snapshot;
