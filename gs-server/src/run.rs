@@ -7,6 +7,8 @@
 //! Order at the end, 5 s in all: the API takes nothing new and the engine radiates nothing new, links finish the frame
 //! that is on the air and the antenna parks, everything that came in becomes durable, the archive is closed.
 
+mod error;
+
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -17,7 +19,7 @@ use futures_util::FutureExt as _;
 use futures_util::future::BoxFuture;
 use mission::port::ReservedFrame;
 use mission::{Clock as _, Entropy, Intent, LinkId, Principal, Snapshot, StationConfig, StationId, UtcUs};
-use protocol::{Key, KeyId};
+use protocol::Key;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
@@ -29,20 +31,19 @@ use crate::elements::task::ElementsTask;
 use crate::elements::{Door, ElementsHandle, Fetcher, Wanted};
 use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, OsEntropy};
 use crate::hamlib::{self, AntennaTask};
-use crate::http::{
-    self, AllowedHosts, HttpState, Identity, RadioOnAir, Tls, TlsError, TlsFiles, Token, TokenError,
-};
+use crate::http::{self, AllowedHosts, HttpState, Identity, RadioOnAir, Tls, TlsFiles, Token};
 use crate::hub::Hub;
-use crate::keys::{self, KeyError};
+use crate::keys;
 use crate::leases::Leases;
-use crate::lifecycle::{Lifecycle, TaskFailure};
+use crate::lifecycle::Lifecycle;
 use crate::links::{self, LinkParts};
 use crate::ops::{sd, upkeep::UpkeepTask};
 use crate::people::{People, PeopleSettings};
 use crate::pointing::{Place, Steering};
 use crate::report::ReportTask;
-use crate::storage::reserve::ReserveError;
 use crate::storage::{EventQuery, Page, Postgres, Store, StoreError, StoreOptions};
+
+pub use error::RunError;
 
 /// What requests under way may take at the end.
 const API_END: Duration = Duration::from_millis(600);
@@ -124,76 +125,6 @@ pub struct Ready {
 pub struct Report {
     /// Tasks that did not end in time and were left behind.
     pub abandoned_tasks: usize,
-}
-
-/// Why a run did not begin, or ended before it was told to.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The configuration.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// A key file.
-    #[error(transparent)]
-    Key(#[from] KeyError),
-    /// A simulated key with real links, or a real key with simulated ones.
-    #[error(
-        "key file {file} is {}, the links are {}: {}",
-        if *.simulated { "simulated" } else { "real" },
-        if *.simulated { "real" } else { "simulated" },
-        if *.simulated { "a real satellite needs a key of its own (gs-server key new)" }
-        else { "a real key never goes to a twin; make one with gs-server key new --simulated" },
-    )]
-    KeyKind {
-        /// The file.
-        file: String,
-        /// What the key is.
-        simulated: bool,
-    },
-    /// Two satellites with one key: what one is told the other would obey, and both would count its nonces.
-    #[error("satellites {first} and {second} have the same key {key}: give each a key of its own")]
-    KeyShared {
-        /// Whose key it is.
-        first: String,
-        /// Who has it, too.
-        second: String,
-        /// The key.
-        key: KeyId,
-    },
-    /// A simulated clock with real links, or the other way round.
-    #[error("the clock is simulated and the links are real: real links refuse it")]
-    ClockKind,
-    /// A store that was brought along is simulated and the links are real, or the other way round.
-    #[error("the data folder is {}, the links are not", if *.simulated { "simulated" } else { "real" })]
-    StoreKind {
-        /// What the folder is.
-        simulated: bool,
-    },
-    /// The archive.
-    #[error("the archive cannot be opened")]
-    Store(#[from] StoreError),
-    /// The reserve.
-    #[error("the reserve cannot be read")]
-    Reserve(#[from] ReserveError),
-    /// The rotator.
-    #[error("the rotator of the configuration cannot be")]
-    Rotator(#[from] mission::pointing::MountFault),
-    /// The token file.
-    #[error(transparent)]
-    Token(#[from] TokenError),
-    /// Certificate or key.
-    #[error(transparent)]
-    Tls(#[from] TlsError),
-    /// The listener or the machine.
-    #[error("{what}")]
-    Io {
-        /// What was tried.
-        what: &'static str,
-        /// What the operating system said.
-        source: std::io::Error,
-    },
-    /// A task died.
-    #[error(transparent)]
-    Task(#[from] TaskFailure),
 }
 
 /// Runs a server until `stop`.
