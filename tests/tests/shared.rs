@@ -159,8 +159,7 @@ fn a_request_sent_to_both_is_taken_by_one_and_a_key_is_used_by_one_at_a_time() {
         commands.iter().all(|command| !matches!(command.stage.as_str(), "sealed" | "radiating")).then_some(())
     });
     let commands: Vec<CommandView> = clients[1].all("/api/v1/commands");
-    let asked: Vec<&CommandView> =
-        commands.iter().filter(|command| command.principal == "operator").collect();
+    let asked: Vec<&CommandView> = commands.iter().filter(|command| command.principal == "local").collect();
     assert_eq!(asked.len() as u64, races, "each request is one command");
     assert_eq!(
         database.sealed_by_the_wrong_one().expect("an answer"),
