@@ -122,10 +122,10 @@ async fn any_other_answer_stops_it_until_an_operator_says_so_across_restarts() {
         assert!(detail.contains(says) && detail.contains("elements fetch"), "{status}: {detail}");
         assert!(!(300..400).contains(&status) || detail.contains(&target), "{detail}");
         assert_eq!(stopped.next_at, None);
-        bench.advance(72 * HOUR_US).await;
+        bench.advance(13 * HOUR_US).await;
         let at = bench.end().await;
         let mut bench = home.serve(at).await;
-        bench.advance(72 * HOUR_US).await;
+        bench.advance(13 * HOUR_US).await;
         assert_eq!(source.count(), 1, "{status}: asked again by itself");
         // An operator may, but no loop hammers it.
         let report = bench.fetch().await;
