@@ -21,8 +21,10 @@ use crate::hub::Hub;
 use crate::lifecycle::Lifecycle;
 use crate::storage::{AlertBatch, EventQuery, FinalRun, Page, Scope, Store, StoreError, StoredEvent};
 
-/// It looks so often, microseconds of the station's clock.
+/// It looks so often while things change, microseconds of the station's clock.
 const LOOK_US: u64 = 2_000_000;
+/// And so often while nothing does: each look without news doubles the wait up to this.
+const CALM_LOOK_US: u64 = 16_000_000;
 /// Batches that wait for the archive; while they do, nothing new is looked at.
 const UNKEPT: usize = 16;
 /// Events read from the archive at once.
@@ -139,6 +141,7 @@ impl AlertsTask {
 
     async fn run(mut self, mut awake: BusyToken, stop: CancellationToken) {
         let mut mind: Option<Mind> = None;
+        let mut wait_us = LOOK_US;
         loop {
             if mind.is_none() {
                 match self.remember().await {
@@ -149,9 +152,10 @@ impl AlertsTask {
                 }
             }
             if let Some(mind) = &mut mind {
-                self.look(mind).await;
+                let has_news = self.look(mind).await;
+                wait_us = if has_news { LOOK_US } else { (wait_us * 2).min(CALM_LOOK_US) };
             }
-            let sleep = self.timer.sleep_until(self.timer.now().mono.plus(LOOK_US));
+            let sleep = self.timer.sleep_until(self.timer.now().mono.plus(wait_us));
             drop(awake);
             let request = tokio::select! {
                 () = stop.cancelled() => return,
@@ -191,12 +195,13 @@ impl AlertsTask {
         Ok(mind)
     }
 
-    /// One look at everything.
-    async fn look(&mut self, mind: &mut Mind) {
+    /// One look at everything; whether anything is new or about to count.
+    async fn look(&mut self, mind: &mut Mind) -> bool {
         self.keep(mind).await;
         if mind.unkept.len() >= UNKEPT {
-            return;
+            return true;
         }
+        let before = mind.events_through;
         self.take_events(mind).await;
         if mind.runs_stale {
             self.take_runs(mind).await;
@@ -210,8 +215,10 @@ impl AlertsTask {
         let status = self.engine.status();
         let conditions = mission::alert::judge(&status, around, &self.policy.thresholds, now.utc);
         let changes = mind.alerts.observe(now, &conditions);
+        let has_news = mind.events_through != before || !changes.is_empty() || mind.alerts.is_pending();
         self.put(mind, now, changes);
         self.keep(mind).await;
+        has_news || !mind.unkept.is_empty()
     }
 
     /// Events since the last look.

@@ -69,6 +69,12 @@ impl Alerts {
         self.tracks.values().filter_map(|track| track.alert.as_ref())
     }
 
+    /// Whether a condition has begun or ended and waits for its rule's delay.
+    #[must_use]
+    pub fn is_pending(&self) -> bool {
+        self.tracks.values().any(|track| track.candidate.is_some())
+    }
+
     /// What it goes by.
     #[must_use]
     pub fn policy(&self) -> &Policy {

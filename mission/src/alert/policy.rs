@@ -103,7 +103,9 @@ impl Rule {
     pub fn built_in(kind: AlertKind) -> Self {
         let (on_delay_s, off_delay_s) = match kind {
             // Judged over samples or passes already.
-            AlertKind::Limit | AlertKind::Beacon | AlertKind::Silent | AlertKind::Elements => (0, 0),
+            AlertKind::Limit | AlertKind::Beacon | AlertKind::Silent => (0, 0),
+            // A station that starts may be given its elements a moment later.
+            AlertKind::Elements => (120, 0),
             AlertKind::Disk => (60, 300),
             AlertKind::Storage => (5, 60),
             AlertKind::Clock => (600, 60),

@@ -146,7 +146,8 @@ fn a_link_that_is_gone_and_elements_that_age_are_alerts() {
     assert!(!watch.all[&1].active);
     watch.world.pass(8 * DAY);
     watch.world.heartbeat();
-    watch.look();
+    // For so long they may be on their way.
+    watch.watch(150 * S, |_, _| true);
     assert!(
         watch.all.values().any(|alert| alert.kind == AlertKind::Elements && alert.active),
         "{:?}",
