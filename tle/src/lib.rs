@@ -13,6 +13,7 @@
 //! | [`geodetic`] | the WGS84 ellipsoid |
 //! | [`station`], [`mask`], [`look`] | a place, its horizon, and look angles with their rates |
 //! | [`doppler`] | what the station hears, and what it must send |
+//! | [`doppler_fit`] | how late a satellite is, from the frequencies at which stations heard it |
 //! | [`sun`], [`shadow`] | where the Sun stands; umbra and penumbra and the times of their edges |
 //! | [`ground`] | sub-satellite point, ground track, footprint |
 //! | [`gravity`] | the acceleration of an orbit, as far as interpolation needs it |
@@ -42,6 +43,7 @@
 
 pub mod batch;
 pub mod doppler;
+pub mod doppler_fit;
 pub mod elements;
 pub mod formats;
 pub mod frames;
