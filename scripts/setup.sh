@@ -2,7 +2,7 @@
 # Installs what a clean Debian or Ubuntu machine lacks, and nothing that is there already.
 #
 #   scripts/setup.sh compiler                what scripts/demo needs
-#   scripts/setup.sh compiler python tools cargo-tools     what scripts/test needs (also: scripts/setup.sh all)
+#   scripts/setup.sh compiler python node tools cargo-tools     what scripts/test needs (also: scripts/setup.sh all)
 #
 # Rust is presupposed; everything else is named here, each package where it is needed.
 set -euo pipefail
@@ -16,6 +16,9 @@ SGP4_VERSION=2.27
 SKYFIELD_VERSION=1.55
 ERFA_VERSION=2.0
 SCHEMATHESIS_VERSION=4.32
+SPACE_PACKET_PARSER_VERSION=6.2
+KAITAI_VERSION=0.11.0
+YAML_VERSION=2.9.1
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
@@ -56,16 +59,34 @@ int main(void) { return 0; }'
 }
 
 # scripts/vectors.py and scripts/orbit_vectors.py make the test vectors with other people's libraries, and
-# scripts/fuzz-api asks a server what schemathesis thinks of; all in .venv.
+# scripts/fuzz-api asks a server what schemathesis thinks of, and scripts/decoder-kit decodes with the runtime of Kaitai
+# Struct and with a reader of XTCE that brings the schema; all in .venv.
 python() {
-  local packages=("cryptography>=$CRYPTOGRAPHY_VERSION" "sgp4>=$SGP4_VERSION" "skyfield>=$SKYFIELD_VERSION" "pyerfa>=$ERFA_VERSION" "schemathesis>=$SCHEMATHESIS_VERSION,<5")
+  local packages=("cryptography>=$CRYPTOGRAPHY_VERSION" "sgp4>=$SGP4_VERSION" "skyfield>=$SKYFIELD_VERSION" "pyerfa>=$ERFA_VERSION" "schemathesis>=$SCHEMATHESIS_VERSION,<5"
+    "kaitaistruct>=${KAITAI_VERSION%.*}" "space-packet-parser>=$SPACE_PACKET_PARSER_VERSION,<7")
   python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages python3 python3-venv
-  if ! .venv/bin/python -c 'import cryptography, sgp4, skyfield, erfa, schemathesis' 2>/dev/null; then
+  if ! .venv/bin/python -c 'import cryptography, sgp4, skyfield, erfa, schemathesis, kaitaistruct, space_packet_parser' 2>/dev/null; then
     say "making .venv with ${packages[*]}"
     python3 -m venv --clear .venv || fail "python3 could not make .venv"
     .venv/bin/python -m pip install --quiet --disable-pip-version-check "${packages[@]}" \
       || fail "pip could not install ${packages[*]} into .venv"
   fi
+}
+
+# scripts/decoder-kit compiles docs/decoder/pixelsat.ksy. The compiler (GPL) and what it needs are tools: they stay in
+# .node, and nothing of them is linked or shipped.
+javascript() {
+  local packages=("kaitai-struct-compiler@$KAITAI_VERSION" "kaitai-struct@$KAITAI_VERSION" "yaml@$YAML_VERSION") package held
+  { have node && have npm; } || install_packages nodejs npm
+  for package in "${packages[@]}"; do
+    held=.node/node_modules/${package%@*}/package.json
+    grep -qs "\"version\": \"${package#*@}\"" "$held" && continue
+    say "filling .node with ${packages[*]}"
+    mkdir -p .node
+    npm install --silent --no-save --no-package-lock --no-audit --no-fund --ignore-scripts --prefix .node "${packages[@]}" >&2 \
+      || fail "npm could not install ${packages[*]} into .node"
+    break
+  done
 }
 
 # End-to-end tests watch system calls, speak HTTP from outside, start PostgreSQL servers of their own, and drive hamlib's dummy rotator and rig.
@@ -97,9 +118,10 @@ for need in "$@"; do
   case "$need" in
     compiler) compiler ;;
     python) python ;;
+    node) javascript ;;
     tools) tools ;;
     cargo-tools) cargo_tools ;;
-    all) compiler; python; tools; cargo_tools ;;
-    *) fail "unknown need '$need': compiler, python, tools, cargo-tools or all" ;;
+    all) compiler; python; javascript; tools; cargo_tools ;;
+    *) fail "unknown need '$need': compiler, python, node, tools, cargo-tools or all" ;;
   esac
 done

@@ -10,8 +10,9 @@ use crate::record::Point;
 pub fn known_parameters() -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for packet_type in 0..=u8::MAX {
-        // Lists (events) have as many entries as their first byte says.
-        let payload = [0; DOWN_PAYLOAD_MAX];
+        // Lists (events) have as many entries as their first byte says: one, so that its values are named, too.
+        let mut payload = [0; DOWN_PAYLOAD_MAX];
+        payload[0] = 1;
         let packet = (0..=payload.len()).find_map(|len| Downlink::decode(packet_type, &payload[..len]).ok());
         if let Some(packet) = packet {
             names.extend(points(&packet).into_iter().map(|point| point.parameter));
@@ -43,4 +44,17 @@ pub fn points(packet: &Downlink) -> Vec<Point> {
         points.push(Point { parameter: format!("{prefix}.{}", field.name), unit: field.unit, value });
     });
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_xtce_for_strangers_has_every_parameter_of_the_archive_and_no_other() {
+        let xtce = include_str!("../../docs/decoder/pixelsat.xtce.xml");
+        let aliases = xtce.split("alias=\"").skip(1).filter_map(|rest| rest.split_once('"'));
+        let aliases: BTreeSet<String> = aliases.map(|(alias, _)| alias.to_owned()).collect();
+        assert_eq!(aliases, known_parameters());
+    }
 }

@@ -6,10 +6,20 @@ meta:
   encoding: ASCII
   endian: be
 doc: |
-  One downlink frame, from its magic on: 16 + length bytes (short) or 240 (full, zero padded). Find the magic first, and check
-  the CRC-32 (ISO-HDLC) yourself: over header and payload in the short form, over all 228 bytes behind it in the full form.
-  Units and meanings: docs/icd.md.
+  One packet as a LoRa receiver hands it over: 0 to 3 bytes of a radio module's header, then one downlink frame, 16 + length
+  bytes (short form) or 240 (full form, zero padded), then whatever else was received. A packet without the magic PIXELSAT at
+  byte 0, 1, 2 or 3 is not ours and fails at once. Everything else passes: a payload whose type or length is not known, and one
+  that was cut, is left as raw bytes.
+
+  Kaitai Struct computes no checksum. A frame is intact if crc32 equals the CRC-32 (ISO-HDLC, as in zlib and Ethernet) of
+  checked_short or of checked_full; believe no value of any other.
+
+  Units are at the end of the names. Meanings: docs/icd.md. Known answers: frames.json beside this file.
+doc-ref: docs/icd.md
 seq:
+  - id: module_header
+    size: lead
+    doc: what a radio module put before the frame; usually nothing
   - id: magic
     contents: PIXELSAT
   - id: crc32
@@ -22,24 +32,82 @@ seq:
     doc: number of the request this answers, 0 = nobody asked
   - id: length
     type: u2
-    valid:
-      max: 224
+    doc: of the payload, 0..=224
   - id: payload
-    size: length
+    size: payload_size
     type:
-      switch-on: packet_type
+      switch-on: layout
       cases:
-        'packet_type::error': error
-        'packet_type::image_info': image_info
-        'packet_type::image_chunk': image_chunk
-        'packet_type::adcs_info': adcs_info
-        'packet_type::schedule_info': schedule_info
-        'packet_type::heartbeat': heartbeat
-        'packet_type::mode_report': mode_report
-        'packet_type::event_report': event_report
-  - id: padding
+        1: error
+        2: image_info
+        3: image_chunk
+        4: adcs_info
+        5: schedule_info
+        6: heartbeat
+        0x40: mode_report
+        0x41: event_report
+    doc: raw bytes when layout is 255
+  - id: rest
     size-eos: true
-    doc: zeros, in a full frame only
+    doc: zeros in a full frame; else bytes that do not belong to the frame
+instances:
+  magic_at_0:
+    pos: 0
+    size: 8
+  magic_at_1:
+    pos: 1
+    size: 8
+  magic_at_2:
+    pos: 2
+    size: 8
+  magic_at_3:
+    pos: 3
+    size: 8
+  lead:
+    doc: bytes before the magic
+    value: >-
+      _io.size < 9 or magic_at_0 == [0x50, 0x49, 0x58, 0x45, 0x4c, 0x53, 0x41, 0x54] ? 0 :
+      magic_at_1 == [0x50, 0x49, 0x58, 0x45, 0x4c, 0x53, 0x41, 0x54] ? 1 :
+      _io.size >= 10 and magic_at_2 == [0x50, 0x49, 0x58, 0x45, 0x4c, 0x53, 0x41, 0x54] ? 2 :
+      _io.size >= 11 and magic_at_3 == [0x50, 0x49, 0x58, 0x45, 0x4c, 0x53, 0x41, 0x54] ? 3 : 0
+  available:
+    value: _io.size - lead - 16
+    doc: bytes behind the frame's header
+  payload_size:
+    value: 'length < available ? length : available'
+  first_byte:
+    pos: lead + 16
+    type: u1
+    if: available >= 1
+    doc: of the payload
+  heartbeat_cam_byte:
+    pos: lead + 132
+    type: u1
+    if: available >= 117
+  layout:
+    doc: number of the payload's type if its length, its flags and its count are what the type wants, else 255
+    value: >-
+      length > available ? 255 :
+      packet_type == packet_type::error and length == 1 ? 1 :
+      packet_type == packet_type::image_info and length == 13 and first_byte <= 1 ? 2 :
+      packet_type == packet_type::image_chunk and length == 224 ? 3 :
+      packet_type == packet_type::adcs_info and length == 141 ? 4 :
+      packet_type == packet_type::schedule_info and length == 9 ? 5 :
+      packet_type == packet_type::heartbeat and length == 117 and heartbeat_cam_byte <= 1 ? 6 :
+      packet_type == packet_type::mode_report and length == 25 ? 0x40 :
+      packet_type == packet_type::event_report and length >= 1 and length == 1 + 17 * first_byte ? 0x41 : 255
+  checked_short:
+    pos: lead + 12
+    size: 4 + length
+    if: length <= available
+    doc: what crc32 covers in a short frame
+  checked_full:
+    pos: lead + 12
+    size: 228
+    if: available >= 224
+    doc: what crc32 covers in a full frame
+  tinygs_satellite:
+    value: '"PixelSat-I"'
 types:
   vector:
     seq:
@@ -72,13 +140,14 @@ types:
     seq:
       - id: exists
         type: u1
+        doc: if 0, all else is 0
       - id: chunks
         type: u4
-      - id: size_bytes
+      - id: image_size_bytes
         type: u4
-      - id: width_px
+      - id: res_x_px
         type: u2
-      - id: height_px
+      - id: res_y_px
         type: u2
   image_chunk:
     seq:
@@ -152,6 +221,10 @@ types:
         doc: since 1970 UTC, 0 if the satellite has no clock
       - id: cam
         type: u1
+    instances:
+      tinygs_temp:
+        value: temp_c
+        doc: °C, under the name that the dashboards of TinyGS know
   mode_report:
     seq:
       - id: model
@@ -188,7 +261,7 @@ types:
         type: u4
       - id: time_ms
         type: u8
-      - id: event
+      - id: code
         type: u1
       - id: argument
         type: u4
