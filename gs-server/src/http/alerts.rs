@@ -2,6 +2,7 @@
 
 use api::{
     AlertNote, AlertView, AssignRequest, Nothing, Page, ProblemKind, ShelveRequest, TargetTested, TargetView,
+    Time,
 };
 use axum::Json;
 use axum::extract::State;
@@ -13,7 +14,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::App;
-use super::extract::{Id, Name, Query, page, paged, time, whole};
+use super::extract::{Id, Name, Query, during, page, paged, time, whole};
 use super::problem::Failure;
 use super::write::{IDEMPOTENCY_REPLAYED, Write};
 use crate::alerts::{Action, ActionFailure, TestFailure};
@@ -26,6 +27,8 @@ pub(super) struct Asked {
     state: Option<String>,
     satellite: Option<String>,
     level: Option<String>,
+    start: Option<Time>,
+    stop: Option<Time>,
     after: Option<i64>,
     before: Option<i64>,
     limit: Option<u32>,
@@ -50,6 +53,7 @@ pub(super) async fn list(
         open,
         satellite: asked.satellite,
         level: level.map_err(|error: mission::level::UnknownLevel| wrong("level", error.to_string()))?,
+        during: during(asked.start, asked.stop)?,
         page: page(asked.after, asked.before, asked.limit)?,
     };
     let alerts = app.state.store.alerts(&query).await?;

@@ -1,13 +1,13 @@
 //! `/api/v1/approvals`: what waits for a second person. `/api/v1/transmissions`: who answered for what.
 
-use api::{ApprovalView, ApproveRequest, Outcome, Page, RefuseRequest, TransmissionView};
+use api::{ApprovalView, ApproveRequest, Outcome, Page, RefuseRequest, Time, TransmissionView};
 use axum::Json;
 use axum::extract::State;
 use serde::Deserialize;
 
 use super::App;
 use super::admit::may;
-use super::extract::{Id, ListQuery, Query, number, page, paged, small, time};
+use super::extract::{Id, ListQuery, Query, during, number, page, paged, small, time};
 use super::problem::Failure;
 use super::release::{release, remake};
 use super::write::Write;
@@ -19,6 +19,8 @@ use crate::storage::{ApprovalRow, TransmissionRow};
 pub(super) struct Which {
     /// `true`: only what still waits.
     open: Option<bool>,
+    start: Option<Time>,
+    stop: Option<Time>,
     after: Option<i64>,
     before: Option<i64>,
     limit: Option<u32>,
@@ -30,7 +32,8 @@ pub(super) async fn list(
 ) -> Result<Json<Page<ApprovalView>>, Failure> {
     let people = &app.state.people;
     let page = page(asked.after, asked.before, asked.limit)?;
-    let rows = people.approvals(asked.open.unwrap_or(false), &page).await?;
+    let during = during(asked.start, asked.stop)?;
+    let rows = people.approvals(asked.open.unwrap_or(false), &during, &page).await?;
     let views = rows.iter().map(|row| view(people, row)).collect();
     Ok(Json(paged(views, &page, |approval: &ApprovalView| approval.id)))
 }
@@ -80,7 +83,7 @@ pub(super) async fn transmissions(
     Query(asked): Query<ListQuery>,
 ) -> Result<Json<Page<TransmissionView>>, Failure> {
     let page = asked.page()?;
-    let mut rows = app.state.store.transmissions(&asked.scope(), &page).await?;
+    let mut rows = app.state.store.transmissions(&asked.scope()?, &page).await?;
     // A command's attempts stay together: those of one that may be cut off come with the next page.
     let last = rows.last().map(|row| row.command);
     let is_full = rows.len() >= page.limit as usize;

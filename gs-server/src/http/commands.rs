@@ -1,7 +1,7 @@
 //! `/api/v1/commands`: telecommands, asked for, looked at, withdrawn.
 
 use api::{
-    CommandRequest, CommandView, GateWord, Nothing, Page, Problem, ProblemKind, StageView, telecommand,
+    CommandRequest, CommandView, GateWord, Nothing, Page, Problem, ProblemKind, StageView, Time, telecommand,
 };
 use axum::Json;
 use axum::extract::State;
@@ -22,6 +22,8 @@ pub(super) struct Asked {
     satellite: Option<String>,
     station: Option<String>,
     link: Option<String>,
+    start: Option<Time>,
+    stop: Option<Time>,
     key: Option<String>,
     stage: Option<String>,
     after: Option<i64>,
@@ -35,7 +37,7 @@ pub(super) async fn list(
 ) -> Result<Json<Page<CommandView>>, Failure> {
     let stage = asked.stage.map(|word| word.parse::<Stage>()).transpose();
     let query = CommandQuery {
-        scope: scope(&asked.satellite, &asked.station, &asked.link),
+        scope: scope(&asked.satellite, &asked.station, &asked.link, (asked.start, asked.stop))?,
         key: asked.key,
         stage: stage
             .map_err(|error| Failure::field(ProblemKind::BadParameter, "stage", error.to_string()))?,

@@ -18,7 +18,7 @@ pub(super) async fn list(
     Query(asked): Query<ListQuery>,
 ) -> Result<Json<Page<DownloadView>>, Failure> {
     let page = asked.page()?;
-    let rows = app.state.store.downloads(&asked.scope(), &page).await?;
+    let rows = app.state.store.downloads(&asked.scope()?, &page).await?;
     Ok(Json(paged(rows.into_iter().map(view).collect(), &page, |download: &DownloadView| download.id)))
 }
 

@@ -25,7 +25,7 @@ pub(super) async fn list(
     Query(query): Query<ListQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Failure> {
-    let (scope, page) = (query.scope(), query.page()?);
+    let (scope, page) = (query.scope()?, query.page()?);
     if scope.link.is_some() {
         let message = "elements are of a satellite, not of a link: ask by satellite or station";
         return Err(Failure::field(ProblemKind::BadParameter, "link", message));

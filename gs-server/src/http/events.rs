@@ -1,7 +1,7 @@
 //! `GET /api/v1/events`, `/api/v1/limits` and `/api/v1/audit`: what happened, which values are out of bounds, and who
 //! did what.
 
-use api::{AuditView, EventView, LimitView, Page, ProblemKind};
+use api::{AuditView, EventView, LimitView, Page, ProblemKind, Time};
 use axum::Json;
 use axum::extract::State;
 use mission::Level;
@@ -9,7 +9,7 @@ use mission::record::EventKind;
 use serde::Deserialize;
 
 use super::App;
-use super::extract::{Query, number, page, paged, scope, time, whole};
+use super::extract::{Query, Within, during, number, page, paged, scope, time, whole};
 use super::problem::Failure;
 use crate::storage::{EventQuery, StoredEvent};
 
@@ -19,6 +19,8 @@ pub(super) struct Asked {
     satellite: Option<String>,
     station: Option<String>,
     link: Option<String>,
+    start: Option<Time>,
+    stop: Option<Time>,
     key: Option<String>,
     kind: Option<String>,
     level: Option<String>,
@@ -35,7 +37,7 @@ pub(super) async fn list(
     let level = asked.level.as_deref().map_or(Ok(Level::Normal), str::parse);
     let kinds = asked.kind.as_deref().map_or(Ok(Vec::new()), kinds);
     let query = EventQuery {
-        scope: scope(&asked.satellite, &asked.station, &asked.link),
+        scope: scope(&asked.satellite, &asked.station, &asked.link, (asked.start, asked.stop))?,
         key: asked.key,
         kinds: kinds.map_err(|word| {
             let known: Vec<&str> = EventKind::ALL.iter().map(|kind| kind.name()).collect();
@@ -59,8 +61,13 @@ fn kinds(words: &str) -> Result<Vec<EventKind>, String> {
     words.split(',').map(find).collect()
 }
 
-pub(super) async fn limits(State(app): State<App>) -> Result<Json<Page<LimitView>>, Failure> {
-    let rows = app.state.store.limits().await?;
+pub(super) async fn limits(
+    State(app): State<App>,
+    Query(asked): Query<Within>,
+) -> Result<Json<Page<LimitView>>, Failure> {
+    let during = asked.during()?;
+    let mut rows = app.state.store.limits().await?;
+    rows.retain(|row| during.holds(row.since_us));
     let views = rows.into_iter().map(|row| LimitView {
         satellite: row.satellite,
         station: row.station,
@@ -75,6 +82,8 @@ pub(super) async fn limits(State(app): State<App>) -> Result<Json<Page<LimitView
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AuditAsked {
+    start: Option<Time>,
+    stop: Option<Time>,
     after: Option<i64>,
     before: Option<i64>,
     limit: Option<u32>,
@@ -85,7 +94,7 @@ pub(super) async fn audit(
     Query(asked): Query<AuditAsked>,
 ) -> Result<Json<Page<AuditView>>, Failure> {
     let page = page(asked.after, asked.before, asked.limit)?;
-    let rows = app.state.store.audit(&page).await?;
+    let rows = app.state.store.audit(&during(asked.start, asked.stop)?, &page).await?;
     let views = rows.into_iter().map(|row| AuditView {
         id: number(row.id),
         station: row.station,

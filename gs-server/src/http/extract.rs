@@ -70,6 +70,8 @@ pub(super) struct ListQuery {
     satellite: Option<String>,
     station: Option<String>,
     link: Option<String>,
+    start: Option<Time>,
+    stop: Option<Time>,
     after: Option<i64>,
     before: Option<i64>,
     limit: Option<u32>,
@@ -93,8 +95,8 @@ pub(super) fn limit(asked: Option<u32>) -> Result<u32, Failure> {
 }
 
 impl ListQuery {
-    pub(super) fn scope(&self) -> storage::Scope {
-        scope(&self.satellite, &self.station, &self.link)
+    pub(super) fn scope(&self) -> Result<storage::Scope, Failure> {
+        scope(&self.satellite, &self.station, &self.link, (self.start, self.stop))
     }
 
     pub(super) fn page(&self) -> Result<storage::Page, Failure> {
@@ -102,12 +104,42 @@ impl ListQuery {
     }
 }
 
+/// From when until when: what a list that comes whole takes.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Within {
+    start: Option<Time>,
+    stop: Option<Time>,
+}
+
+impl Within {
+    pub(super) fn during(&self) -> Result<storage::During, Failure> {
+        during(self.start, self.stop)
+    }
+}
+
+pub(super) fn during(start: Option<Time>, stop: Option<Time>) -> Result<storage::During, Failure> {
+    if let (Some(start), Some(stop)) = (start, stop)
+        && start >= stop
+    {
+        let message = format!("must lie after start ({start}), found {stop}");
+        return Err(Failure::field(ProblemKind::BadParameter, "stop", message));
+    }
+    Ok(storage::During { start_us: start.map(Time::unix_us), stop_us: stop.map(Time::unix_us) })
+}
+
 pub(super) fn scope(
     satellite: &Option<String>,
     station: &Option<String>,
     link: &Option<String>,
-) -> storage::Scope {
-    storage::Scope { satellite: satellite.clone(), station: station.clone(), link: link.clone() }
+    (start, stop): (Option<Time>, Option<Time>),
+) -> Result<storage::Scope, Failure> {
+    Ok(storage::Scope {
+        satellite: satellite.clone(),
+        station: station.clone(),
+        link: link.clone(),
+        during: during(start, stop)?,
+    })
 }
 
 pub(super) fn page(

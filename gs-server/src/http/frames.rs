@@ -1,6 +1,6 @@
 //! `GET /api/v1/frames` and `/api/v1/frames/{id}`: what was heard, byte for byte.
 
-use api::{FrameView, PacketView, Page, ReceptionView};
+use api::{FrameView, PacketView, Page, ReceptionView, Time};
 use axum::Json;
 use axum::extract::State;
 use protocol::{DownFrame, Downlink};
@@ -17,6 +17,8 @@ pub(super) struct Asked {
     satellite: Option<String>,
     station: Option<String>,
     link: Option<String>,
+    start: Option<Time>,
+    stop: Option<Time>,
     after: Option<i64>,
     before: Option<i64>,
     limit: Option<u32>,
@@ -28,7 +30,7 @@ pub(super) async fn list(
     Query(asked): Query<Asked>,
 ) -> Result<Json<Page<FrameView>>, Failure> {
     let query = FrameQuery {
-        scope: scope(&asked.satellite, &asked.station, &asked.link),
+        scope: scope(&asked.satellite, &asked.station, &asked.link, (asked.start, asked.stop))?,
         packet_type: asked.packet_type,
         page: page(asked.after, asked.before, asked.limit)?,
     };

@@ -21,7 +21,7 @@ pub(super) async fn list(
     Query(asked): Query<ListQuery>,
 ) -> Result<Json<Page<ImageView>>, Failure> {
     let page = asked.page()?;
-    let rows = app.state.store.images(&asked.scope(), &page).await?;
+    let rows = app.state.store.images(&asked.scope()?, &page).await?;
     Ok(Json(paged(rows.into_iter().map(view).collect(), &page, |image: &ImageView| image.id)))
 }
 

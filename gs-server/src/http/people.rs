@@ -9,14 +9,19 @@ use axum::extract::State;
 use axum::http::StatusCode;
 
 use super::App;
-use super::extract::{Name, time, whole};
+use super::extract::{Name, Query, Within, time, whole};
 use super::problem::Failure;
 use super::write::Write;
 use crate::people::{Caller, Rights, Role, TokenWanted, UserChanged, UserWanted};
 use crate::storage::{TokenRow, UserRow};
 
-pub(super) async fn users(State(app): State<App>) -> Result<Json<Page<UserView>>, Failure> {
-    let users = app.state.people.users().await?;
+pub(super) async fn users(
+    State(app): State<App>,
+    Query(asked): Query<Within>,
+) -> Result<Json<Page<UserView>>, Failure> {
+    let during = asked.during()?;
+    let mut users = app.state.people.users().await?;
+    users.retain(|(user, _)| during.holds(user.created_at_us));
     Ok(Json(whole(users.into_iter().map(|(user, sessions)| user_view(user, sessions)).collect())))
 }
 
@@ -75,8 +80,13 @@ async fn link(app: &App, caller: &Caller, user: Option<&str>) -> Result<Json<Lin
     }))
 }
 
-pub(super) async fn tokens(State(app): State<App>) -> Result<Json<Page<TokenView>>, Failure> {
-    let tokens = app.state.people.tokens().await?;
+pub(super) async fn tokens(
+    State(app): State<App>,
+    Query(asked): Query<Within>,
+) -> Result<Json<Page<TokenView>>, Failure> {
+    let during = asked.during()?;
+    let mut tokens = app.state.people.tokens().await?;
+    tokens.retain(|token| during.holds(token.created_at_us));
     Ok(Json(whole(tokens.into_iter().map(token_view).collect())))
 }
 

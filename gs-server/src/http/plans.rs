@@ -9,17 +9,21 @@ use mission::status::PlanStatus;
 use mission::{Intent, PlanName, UtcUs};
 
 use super::App;
-use super::extract::{Name, satellite, time, whole};
+use super::extract::{Name, Query, Within, satellite, time, whole};
 use super::problem::Failure;
 use super::write::Write;
 use crate::plan::check_words;
 use crate::storage::StoreError;
 
 /// Those in use.
-pub(super) async fn list(State(app): State<App>) -> Result<Json<Page<PlanView>>, Failure> {
+pub(super) async fn list(
+    State(app): State<App>,
+    Query(asked): Query<Within>,
+) -> Result<Json<Page<PlanView>>, Failure> {
+    let during = asked.during()?;
     let status = app.state.engine.status();
     let mut views = Vec::with_capacity(status.plans.len());
-    for plan in &status.plans {
+    for plan in status.plans.iter().filter(|plan| during.holds(plan.added_at.0)) {
         views.push(view(&app, plan).await?);
     }
     Ok(Json(whole(views)))

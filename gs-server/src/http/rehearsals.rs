@@ -22,7 +22,7 @@ use rehearsal::rehearse::{
 use tokio::sync::Semaphore;
 
 use super::App;
-use super::extract::{Id, satellite, time, whole};
+use super::extract::{Id, Query, Within, satellite, time, whole};
 use super::problem::Failure;
 use super::sky::{bad, compute, known, site};
 use super::write::{IDEMPOTENCY_REPLAYED, Write};
@@ -144,9 +144,14 @@ impl Job {
     }
 }
 
-pub(super) async fn list(State(app): State<App>) -> Json<Page<RehearsalView>> {
+pub(super) async fn list(
+    State(app): State<App>,
+    Query(asked): Query<Within>,
+) -> Result<Json<Page<RehearsalView>>, Failure> {
+    let during = asked.during()?;
     let jobs: Vec<Arc<Job>> = app.rehearsals.with(|jobs| jobs.list.iter().rev().cloned().collect());
-    Json(whole(jobs.iter().map(|job| job.view(false)).collect()))
+    let within = jobs.iter().filter(|job| during.holds(job.asked_at.unix_us()));
+    Ok(Json(whole(within.map(|job| job.view(false)).collect())))
 }
 
 pub(super) async fn get(State(app): State<App>, id: Id) -> Result<Json<RehearsalView>, Failure> {

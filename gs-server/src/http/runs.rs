@@ -21,7 +21,7 @@ pub(super) async fn list(
     let store = &app.state.store;
     let mut names: BTreeMap<i64, String> = BTreeMap::new();
     let mut views = Vec::new();
-    for row in store.runs(&asked.scope(), &page).await? {
+    for row in store.runs(&asked.scope()?, &page).await? {
         let name = match names.get(&row.plan) {
             Some(name) => name.clone(),
             None => {

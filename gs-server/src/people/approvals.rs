@@ -5,7 +5,7 @@
 
 use super::caller::Caller;
 use super::{People, PeopleError};
-use crate::storage::{ApprovalRow, Page, PeopleChange, StoreError};
+use crate::storage::{ApprovalRow, During, Page, PeopleChange, StoreError};
 
 /// Something critical that somebody wants.
 #[derive(Debug, Clone)]
@@ -133,8 +133,13 @@ impl People {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub(crate) async fn approvals(&self, open: bool, page: &Page) -> Result<Vec<ApprovalRow>, StoreError> {
-        let mut rows = self.0.store.approvals(open, page).await?;
+    pub(crate) async fn approvals(
+        &self,
+        open: bool,
+        during: &During,
+        page: &Page,
+    ) -> Result<Vec<ApprovalRow>, StoreError> {
+        let mut rows = self.0.store.approvals(open, during, page).await?;
         rows.retain(|row| !open || self.state_of(row) == Asked::Awaiting);
         Ok(rows)
     }

@@ -10,7 +10,7 @@ use sqlx::AssertSqlSafe;
 
 use super::convert::{int, narrow, parse};
 use super::db::{Connection, sql};
-use super::read::{List, Page, one};
+use super::read::{During, List, Page, one};
 use super::row::{Row as _, row, select};
 use super::snapshot::Own;
 use super::{Store, StoreError, StoredEvent, pg};
@@ -198,6 +198,8 @@ pub struct AlertQuery {
     pub satellite: Option<String>,
     /// Only those that were at least this grave.
     pub level: Level,
+    /// Only those that were raised within.
+    pub during: During,
     /// Which part, by id.
     pub page: Page,
 }
@@ -307,8 +309,10 @@ impl Store {
         let worst = (query.level > Level::Normal).then(|| {
             Level::ALL.iter().filter(|level| **level >= query.level).map(|level| level.name()).collect()
         });
-        let mut list =
-            List::of::<AlertRow>().equal("satellite", query.satellite.as_deref()).any_of("worst", worst);
+        let mut list = List::of::<AlertRow>()
+            .equal("satellite", query.satellite.as_deref())
+            .any_of("worst", worst)
+            .during("raised_at_us", &query.during);
         let own = self.own();
         list.statement.push(" and id > ").push_bind(own.after).push(" and id < ").push_bind(own.before);
         if let Some(open) = query.open {

@@ -9,7 +9,7 @@ use super::db::sql;
 use super::row::{Row, row, select};
 use super::rows::StageRow;
 use super::write::Transaction;
-use super::{Page, Scope, Store, StoreError};
+use super::{During, Page, Scope, Store, StoreError};
 
 row! {
     /// A user.
@@ -303,8 +303,13 @@ impl Store {
     }
 
     /// A page of what needed a second person; `open`: only what still waits.
-    pub(crate) async fn approvals(&self, open: bool, page: &Page) -> Result<Vec<ApprovalRow>, StoreError> {
-        let list = super::read::List::of::<ApprovalRow>();
+    pub(crate) async fn approvals(
+        &self,
+        open: bool,
+        during: &During,
+        page: &Page,
+    ) -> Result<Vec<ApprovalRow>, StoreError> {
+        let list = super::read::List::of::<ApprovalRow>().during("asked_at_us", during);
         let list = if open { list.equal("state", Some("awaiting")) } else { list };
         list.page(self, "id", page).await
     }
@@ -315,7 +320,7 @@ impl Store {
         scope: &Scope,
         page: &Page,
     ) -> Result<Vec<TransmissionRow>, StoreError> {
-        super::read::List::of::<TransmissionRow>().scope(scope).page(self, "command", page).await
+        super::read::List::of::<TransmissionRow>().scope("at_us", scope).page(self, "command", page).await
     }
 
     /// Whose call sign stands for a station.

@@ -4,7 +4,7 @@ use api::ProblemKind as K;
 use api::{AlertNote, AlertView, AssignRequest, Nothing, ShelveRequest, TargetTested, TargetView};
 
 use super::operation::{Doc, Kind, get, param, post};
-use super::table::{AFTER, BEFORE, INTENT, LIMIT};
+use super::table::{AFTER, BEFORE, FROM, INTENT, LIMIT, UNTIL};
 
 pub(super) fn alerts() -> Vec<Doc> {
     vec![
@@ -17,6 +17,8 @@ pub(super) fn alerts() -> Vec<Doc> {
                     Kind::OneOf(&["normal", "watch", "warning", "distress", "critical", "severe"]),
                     "Only what was at least this grave.",
                 ),
+                FROM,
+                UNTIL,
                 AFTER,
                 BEFORE,
                 LIMIT,

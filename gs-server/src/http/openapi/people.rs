@@ -8,7 +8,7 @@ use api::{
 };
 
 use super::operation::{Doc, Kind, delete, get, param, post};
-use super::table::{AFTER, BEFORE, INTENT, LIMIT, LIST};
+use super::table::{AFTER, BEFORE, FROM, INTENT, LIMIT, LIST, UNTIL};
 
 pub(super) fn people() -> Vec<Doc> {
     vec![
@@ -40,7 +40,7 @@ pub(super) fn people() -> Vec<Doc> {
             .body::<Nothing>()
             .json::<LinkMade>()
             .problems(&[K::UserExists]),
-        get("/api/v1/users", "people", "list_users", "Who there is").page::<UserView>(),
+        get("/api/v1/users", "people", "list_users", "Who there is").query(&[FROM, UNTIL]).page::<UserView>(),
         post("/api/v1/users", "people", "add_user", "Somebody new")
             .body::<UserRequest>()
             .json::<UserView>()
@@ -55,6 +55,7 @@ pub(super) fn people() -> Vec<Doc> {
             .json::<LinkMade>()
             .problems(&[K::UnknownUser]),
         get("/api/v1/tokens", "people", "list_tokens", "Tokens of machines; never their secrets")
+            .query(&[FROM, UNTIL])
             .page::<TokenView>(),
         post("/api/v1/tokens", "people", "new_token", "A token for a machine; its secret is told once")
             .body::<TokenRequest>()
@@ -67,6 +68,8 @@ pub(super) fn people() -> Vec<Doc> {
         get("/api/v1/approvals", "people", "list_approvals", "What waits or waited for a second person")
             .query(&[
                 param("open", Kind::OneOf(&["true", "false"]), "Only what waits still."),
+                FROM,
+                UNTIL,
                 AFTER,
                 BEFORE,
                 LIMIT,
@@ -93,6 +96,7 @@ pub(super) fn people() -> Vec<Doc> {
 pub(super) fn rehearsals() -> Vec<Doc> {
     vec![
         get("/api/v1/rehearsals", "plans", "list_rehearsals", "Rehearsals that were asked for, newest first")
+            .query(&[FROM, UNTIL])
             .page::<RehearsalView>(),
         post("/api/v1/rehearsals", "plans", "rehearse", "Send a plan through its coming pass in simulation")
             .body::<RehearsalRequest>()

@@ -23,7 +23,9 @@ pub(super) const AFTER: Param =
 pub(super) const BEFORE: Param =
     param("before", Kind::Whole(i64::MIN, i64::MAX), "Downwards from here: what precedes this number.");
 pub(super) const LIMIT: Param = param("limit", Kind::Whole(1, 1000), "Entries of a page; 100 when left out.");
-pub(super) const LIST: [Param; 6] = [SATELLITE, STATION, LINK, AFTER, BEFORE, LIMIT];
+pub(super) const FROM: Param = param("start", Kind::Time, "Not before this.");
+pub(super) const UNTIL: Param = param("stop", Kind::Time, "Before this.");
+pub(super) const LIST: [Param; 8] = [SATELLITE, STATION, LINK, FROM, UNTIL, AFTER, BEFORE, LIMIT];
 const START: Param = param("start", Kind::Time, "Begin of the window; now when left out.");
 const STOP: Param =
     param("stop", Kind::Time, "End of the window; two days after its begin when left out, 31 at most.");
@@ -150,9 +152,10 @@ fn archive() -> Vec<Doc> {
             ])
             .page::<EventView>(),
         get("/api/v1/limits", "archive", "list_limits", "Values that have been judged by their limits")
+            .query(&[FROM, UNTIL])
             .page::<LimitView>(),
         get("/api/v1/audit", "archive", "list_audit", "Who did what, when")
-            .query(&[AFTER, BEFORE, LIMIT])
+            .query(&[FROM, UNTIL, AFTER, BEFORE, LIMIT])
             .page::<AuditView>(),
         get("/api/v1/stream", "archive", "stream", "Events, values, status as they come, over a WebSocket")
             .more(
@@ -328,7 +331,9 @@ fn plans() -> Vec<Doc> {
             .problems(&PLANS)
     };
     vec![
-        get("/api/v1/plans", "plans", "list_plans", "The plans in use").page::<PlanView>(),
+        get("/api/v1/plans", "plans", "list_plans", "The plans in use")
+            .query(&[FROM, UNTIL])
+            .page::<PlanView>(),
         post("/api/v1/plans", "plans", "add_plan", "Hand a plan over; it is not armed")
             .body::<PlanText>()
             .json::<Outcome>()

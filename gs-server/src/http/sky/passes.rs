@@ -94,7 +94,7 @@ pub(in crate::http) async fn history(
     State(app): State<App>,
     Query(query): Query<ListQuery>,
 ) -> Result<Json<Page<PassKept>>, Failure> {
-    let (scope, page) = (query.scope(), query.page()?);
+    let (scope, page) = (query.scope()?, query.page()?);
     if scope.link.is_some() {
         return Err(bad("link", "a pass is over a station, not over a link: ask by satellite or station"));
     }

@@ -3,6 +3,7 @@
 mod alerts;
 mod client;
 mod elements;
+mod lists;
 mod openapi;
 mod operations;
 mod page;

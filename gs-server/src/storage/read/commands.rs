@@ -45,7 +45,7 @@ impl Store {
     /// [`StoreError`] when the database cannot be read.
     pub async fn commands(&self, query: &CommandQuery) -> Result<Vec<CommandNow>, StoreError> {
         let commands: Vec<CommandRow> = List::of::<CommandRow>()
-            .scope(&query.scope)
+            .scope("created_at_us", &query.scope)
             .equal("key", query.key.as_deref())
             .equal(
                 "(select stage from command_stages where command = commands.id order by id desc limit 1)",

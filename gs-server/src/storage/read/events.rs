@@ -7,7 +7,7 @@ use super::super::convert::exactly;
 use super::super::db::sql;
 use super::super::row::{Row as _, select};
 use super::super::{AuditRow, EventRow, IntentRow, LimitRow, Store, StoreError, StoredEvent, StoredIntent};
-use super::{List, Page, Scope};
+use super::{During, List, Page, Scope};
 
 /// Which events.
 #[derive(Debug, Clone, Default)]
@@ -56,7 +56,7 @@ impl Store {
             Level::ALL.iter().filter(|level| **level >= query.level).map(|level| level.name()).collect()
         });
         let rows: Vec<EventRow> = List::of::<EventRow>()
-            .scope(&query.scope)
+            .scope("at_us", &query.scope)
             .equal("key", query.key.as_deref())
             .any_of("kind", kinds)
             .any_of("level", levels)
@@ -87,8 +87,8 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
-    pub async fn audit(&self, page: &Page) -> Result<Vec<AuditRow>, StoreError> {
-        List::of::<AuditRow>().page(self, "id", page).await
+    pub async fn audit(&self, during: &During, page: &Page) -> Result<Vec<AuditRow>, StoreError> {
+        List::of::<AuditRow>().during("at_us", during).page(self, "id", page).await
     }
 
     /// How much there is of everything but telemetry, which would have to be read to be counted.

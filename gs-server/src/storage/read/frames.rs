@@ -37,7 +37,7 @@ impl Store {
     /// [`StoreError`] when the database cannot be read.
     pub async fn frames(&self, query: &FrameQuery) -> Result<Vec<Heard>, StoreError> {
         let frames: Vec<FrameRow> = List::of::<FrameRow>()
-            .scope(&query.scope)
+            .scope("heard_at_us", &query.scope)
             .equal_number("packet_type", query.packet_type.map(i64::from))
             .page(self, "id", &query.page)
             .await?;

@@ -47,7 +47,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn images(&self, scope: &Scope, page: &Page) -> Result<Vec<ImageRow>, StoreError> {
-        List::of::<ImageRow>().scope(scope).page(self, "id", page).await
+        List::of::<ImageRow>().scope("declared_at_us", scope).page(self, "id", page).await
     }
 
     /// An image and the map of its chunks.
@@ -115,7 +115,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn downloads(&self, scope: &Scope, page: &Page) -> Result<Vec<DownloadRow>, StoreError> {
-        List::of::<DownloadRow>().scope(scope).page(self, "id", page).await
+        List::of::<DownloadRow>().scope("created_at_us", scope).page(self, "id", page).await
     }
 
     /// A download.

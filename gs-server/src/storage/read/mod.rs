@@ -56,6 +56,25 @@ pub struct Scope {
     pub station: Option<String>,
     /// Of this link.
     pub link: Option<String>,
+    /// From when until when.
+    pub during: During,
+}
+
+/// From when until when; no end where there is none.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct During {
+    /// Not before this, microseconds since 1970.
+    pub start_us: Option<i64>,
+    /// Before this.
+    pub stop_us: Option<i64>,
+}
+
+impl During {
+    /// Whether a moment lies within.
+    pub fn holds(&self, at_us: i64) -> bool {
+        self.start_us.is_none_or(|start_us| at_us >= start_us)
+            && self.stop_us.is_none_or(|stop_us| at_us < stop_us)
+    }
 }
 
 /// A list with conditions; values are bound, never written into the statement.
@@ -93,10 +112,23 @@ impl List {
         self
     }
 
-    pub(super) fn scope(self, scope: &Scope) -> Self {
+    /// `at` is the column that says when.
+    pub(super) fn scope(self, at: &'static str, scope: &Scope) -> Self {
         self.equal("satellite", scope.satellite.as_deref())
             .equal("station", scope.station.as_deref())
             .equal("link", scope.link.as_deref())
+            .during(at, &scope.during)
+    }
+
+    /// `at` is the column that says when.
+    pub(super) fn during(mut self, at: &'static str, during: &During) -> Self {
+        if let Some(start_us) = during.start_us {
+            self.statement.push(format_args!(" and {at} >= ")).push_bind(start_us);
+        }
+        if let Some(stop_us) = during.stop_us {
+            self.statement.push(format_args!(" and {at} < ")).push_bind(stop_us);
+        }
+        self
     }
 
     /// The rows of the page, `id` being the column that numbers them.

@@ -35,7 +35,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn runs(&self, scope: &Scope, page: &Page) -> Result<Vec<RunRow>, StoreError> {
-        List::of::<RunRow>().scope(scope).page(self, "id", page).await
+        List::of::<RunRow>().scope("aos_at_us", scope).page(self, "id", page).await
     }
 
     /// One run.

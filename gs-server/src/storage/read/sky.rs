@@ -11,7 +11,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn elements(&self, scope: &Scope, page: &Page) -> Result<Vec<ElementsRow>, StoreError> {
-        List::of::<ElementsRow>().scope(scope).page(self, "id", page).await
+        List::of::<ElementsRow>().scope("added_at_us", scope).page(self, "id", page).await
     }
 
     /// One set of elements.
@@ -54,7 +54,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn passes(&self, scope: &Scope, page: &Page) -> Result<Vec<PassRow>, StoreError> {
-        List::of::<PassRow>().scope(scope).page(self, "id", page).await
+        List::of::<PassRow>().scope("aos_at_us", scope).page(self, "id", page).await
     }
 
     /// What a pass used, in order of time.

@@ -206,7 +206,7 @@ async fn downloads_limits_audit_and_intents_are_read_back(kind: Kind) {
     let limits = store.limits().await.unwrap();
     let limits: Vec<_> = limits.iter().map(|l| (l.parameter.as_str(), l.level.as_str(), l.value)).collect();
     assert_eq!(limits, [("heartbeat.rad", "normal", None), ("heartbeat.temp", "severe", Some(61.5))]);
-    let audit = store.audit(&Page::default()).await.unwrap();
+    let audit = store.audit(&During::default(), &Page::default()).await.unwrap();
     let audit: Vec<_> = audit.iter().map(|row| (row.id, row.station.as_str(), row.action.as_str())).collect();
     assert_eq!(audit, [(2, "oslo", "command.cancel"), (1, "oslo", "command.create")]);
 

@@ -24,7 +24,7 @@ async fn everything(store: &Store) -> Result<Vec<String>, StoreError> {
     told.push(format!("{:?}", store.image_bytes(1).await?));
     told.push(format!("{:?}", store.downloads(&Scope::default(), &page).await?));
     told.push(format!("{:?}", store.limits().await?));
-    told.push(format!("{:?}", store.audit(&page).await?));
+    told.push(format!("{:?}", store.audit(&During::default(), &page).await?));
     told.push(format!("{:?}", store.find_intent(&mission::Principal::new("ada"), "once").await?));
     told.push(format!("{:?}", store.snapshot(&[route().satellite], &[key()]).await?));
     for parameter in store.parameters().await? {

@@ -2,7 +2,7 @@
 
 use mission::record::Record;
 
-use super::super::{FrameQuery, Page, Store, StoreError, StoreOptions};
+use super::super::{During, FrameQuery, Page, Store, StoreError, StoreOptions};
 use super::records::*;
 use super::{Dice, options};
 
@@ -67,7 +67,7 @@ async fn a_limit_hit_anywhere_in_a_batch_leaves_nothing_half() {
             (counts.frames.cast_unsigned(), counts.receptions, counts.events),
             (stored, counts.frames, 2 * counts.frames)
         );
-        let audit = store.audit(&Page { limit: 1000, ..Page::default() }).await.unwrap();
+        let audit = store.audit(&During::default(), &Page { limit: 1000, ..Page::default() }).await.unwrap();
         assert_eq!(audit.len() as u64, extra);
         store.close().await.unwrap();
         drop(store);

@@ -24,7 +24,7 @@ async fn told(store: &Store) -> Vec<String> {
         format!("{:?}", store.image(1).await.unwrap()),
         format!("{:?}", store.downloads(&Scope::default(), &page).await.unwrap()),
         format!("{:?}", store.latest("pixelsat-1").await.unwrap()),
-        format!("{:?}", store.audit(&page).await.unwrap()),
+        format!("{:?}", store.audit(&During::default(), &page).await.unwrap()),
         format!("{:?}", store.counts().await.unwrap()),
     ]
 }
