@@ -5,7 +5,6 @@
 //! stream asks for it, and shared from then on.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
 use api::{StreamMessage, StreamValue, Topic};
@@ -17,6 +16,7 @@ use tokio::sync::{OnceCell, watch};
 use tokio_util::sync::CancellationToken;
 
 use super::super::{App, commands, events, extract, frames, runs, station};
+use super::recent::{After, Recent};
 use crate::clock::wall_sleep;
 use crate::storage::{Page, Scope, Store, StoreError, StoredEvent};
 
@@ -154,13 +154,34 @@ pub(super) struct Batch {
     pub(super) events: Vec<Prepared>,
 }
 
+impl Batch {
+    pub(super) fn first(&self) -> Option<i64> {
+        self.events.first().map(Prepared::sequence)
+    }
+
+    pub(super) fn last(&self) -> Option<i64> {
+        self.events.last().map(Prepared::sequence)
+    }
+
+    /// Each event follows the one before.
+    pub(super) fn is_whole(&self) -> bool {
+        follow_each_other(&self.events)
+    }
+}
+
+pub(super) fn follow_each_other(events: &[Prepared]) -> bool {
+    events
+        .iter()
+        .zip(events.iter().skip(1))
+        .all(|(one, next)| next.sequence() == one.sequence().saturating_add(1))
+}
+
 /// Where streams listen. Cheap to clone.
 #[derive(Clone)]
 pub(in crate::http) struct Feed {
     batches: broadcast::Sender<Arc<Batch>>,
     status: watch::Sender<Utf8Bytes>,
-    /// The newest event that was seen.
-    last: Arc<AtomicI64>,
+    recent: Arc<Recent>,
 }
 
 impl Feed {
@@ -168,7 +189,7 @@ impl Feed {
         Self {
             batches: broadcast::Sender::new(BATCHES),
             status: watch::Sender::new(Utf8Bytes::default()),
-            last: Arc::default(),
+            recent: Arc::default(),
         }
     }
 
@@ -178,6 +199,11 @@ impl Feed {
 
     pub(super) fn status(&self) -> watch::Receiver<Utf8Bytes> {
         self.status.subscribe()
+    }
+
+    /// What there is after an event, as far as it is at hand. Subscribe to the [batches](Self::batches) before.
+    pub(super) fn after(&self, event: Option<i64>) -> Option<After> {
+        self.recent.after(event)
     }
 
     /// Gathers and hands out until `stop`.
@@ -204,18 +230,18 @@ impl Feed {
             {
                 events.push(Prepared::new(event));
             }
-            if let Some(last) = events.last() {
-                self.last.store(last.sequence(), Ordering::Relaxed);
-            }
+            let batch = Arc::new(Batch { events });
+            // At hand before it is sent: whoever subscribes in between has it twice, and not never.
+            self.recent.add(&batch);
             // Nobody listening is no error.
-            let _ = self.batches.send(Arc::new(Batch { events }));
+            let _ = self.batches.send(batch);
             wall_sleep(GATHER).await;
         }
     }
 
     async fn tell_status(&self, app: &App) {
         if let Ok(last) = app.state.store.last_event_seq().await {
-            self.last.fetch_max(last, Ordering::Relaxed);
+            self.recent.begin(last);
         }
         let mut changes = app.state.engine.status_changes();
         loop {
@@ -236,7 +262,6 @@ impl Feed {
     /// The status as it is now.
     pub(super) fn status_now(&self, app: &App) -> Option<Utf8Bytes> {
         let status = app.state.engine.status();
-        let last = self.last.load(Ordering::Relaxed);
-        write(&StreamMessage::Status(station::view(app, &status, last)))
+        write(&StreamMessage::Status(station::view(app, &status, self.recent.last())))
     }
 }

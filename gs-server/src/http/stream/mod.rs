@@ -1,10 +1,12 @@
 //! `GET /api/v1/stream?after=SEQUENCE&topics=…`: what happens, in order, each once and without a hole, and the status.
 //!
 //! The archive is the queue. A stream remembers the last event it looked at; what is newer is read from the archive until
-//! there is no more, then taken from the feed, and from the archive again whenever the feed had to leave something out.
+//! there is no more, then taken from the feed, and from the archive again whenever the feed had to leave something out. What
+//! came last is at hand for all: a stream that begins or goes on within that asks the archive nothing.
 //! So a slow client costs no memory: it lags behind in the archive, and one that takes nothing at all is let go.
 
 mod feed;
+mod recent;
 mod wanted;
 
 use std::borrow::Cow;
@@ -21,7 +23,7 @@ use axum::extract::ws::{
 use axum::response::Response;
 use futures_util::SinkExt as _;
 use serde::Deserialize;
-use tokio::sync::broadcast::{self, error::RecvError};
+use tokio::sync::broadcast::error::RecvError;
 
 use super::App;
 use super::extract::Query;
@@ -31,7 +33,8 @@ use crate::people::Caller;
 use crate::storage::{EventQuery, Page, StoreError};
 pub(super) use feed::Feed;
 pub(super) use feed::Prepared;
-use feed::{Batch, write};
+use feed::{Batch, follow_each_other, write};
+use recent::After;
 use wanted::Wanted;
 
 /// Bytes that a client's message may have.
@@ -161,8 +164,8 @@ impl Follower {
         let mut batches = self.app.feed.batches();
         let mut status = self.app.feed.status();
         status.mark_unchanged();
-        self.greet(after).await?;
-        self.replay().await?;
+        let at_hand = self.greet(after).await?;
+        self.catch_up(at_hand).await?;
         self.send(&StreamMessage::Live { sequence: self.last }).await?;
         if self.wanted.has(Topic::Status)
             && let Some(now) = self.app.feed.status_now(&self.app)
@@ -180,7 +183,7 @@ impl Follower {
                 () = app.state.stop.cancelled() => return ControlFlow::Break(End::Stopping),
                 () = &mut gone => return ControlFlow::Break(End::LoggedOut),
                 heard = self.socket.recv() => self.hear(heard).await?,
-                batch = batches.recv() => self.pass_on(batch).await?,
+                batch = batches.recv() => self.take(batch).await?,
                 changed = status.changed(), if self.wanted.has(Topic::Status) => {
                     if changed.is_err() {
                         return ControlFlow::Break(End::Stopping);
@@ -196,8 +199,13 @@ impl Follower {
         }
     }
 
-    async fn greet(&mut self, after: Option<i64>) -> ControlFlow<End> {
-        let last_sequence = archive(self.app.state.store.last_event_seq().await)?;
+    /// Says where the stream begins; what follows there, when it is at hand.
+    async fn greet(&mut self, after: Option<i64>) -> ControlFlow<End, Option<After>> {
+        let at_hand = self.app.feed.after(after);
+        let last_sequence = match &at_hand {
+            Some(after) => after.last,
+            None => archive(self.app.state.store.last_event_seq().await)?,
+        };
         // Whoever knows more than the archive knows another archive.
         let reset = after.is_some_and(|after| after > last_sequence);
         self.last = after.filter(|_| !reset).unwrap_or(last_sequence).max(0);
@@ -208,7 +216,21 @@ impl Follower {
             after: self.last,
             reset,
         };
-        self.send(&hello).await
+        self.send(&hello).await?;
+        ControlFlow::Continue(at_hand)
+    }
+
+    /// Everything after the last event that was looked at: from what is at hand, or from the archive.
+    async fn catch_up(&mut self, at_hand: Option<After>) -> ControlFlow<End> {
+        match at_hand {
+            Some(after) => {
+                for batch in after.batches {
+                    self.pass_on(&batch).await?;
+                }
+                ControlFlow::Continue(())
+            }
+            None => self.replay().await,
+        }
     }
 
     /// Everything that the archive has after the last event that was looked at.
@@ -232,20 +254,25 @@ impl Follower {
         }
     }
 
-    async fn pass_on(&mut self, batch: Result<Arc<Batch>, broadcast::error::RecvError>) -> ControlFlow<End> {
-        let batch = match batch {
-            Ok(batch) => batch,
-            Err(RecvError::Lagged(_)) => return self.replay().await,
-            Err(RecvError::Closed) => return ControlFlow::Break(End::Stopping),
-        };
+    async fn take(&mut self, batch: Result<Arc<Batch>, RecvError>) -> ControlFlow<End> {
+        match batch {
+            Ok(batch) => self.pass_on(&batch).await,
+            Err(RecvError::Lagged(_)) => {
+                let at_hand = self.app.feed.after(Some(self.last));
+                self.catch_up(at_hand).await
+            }
+            Err(RecvError::Closed) => ControlFlow::Break(End::Stopping),
+        }
+    }
+
+    async fn pass_on(&mut self, batch: &Batch) -> ControlFlow<End> {
         let known = batch.events.partition_point(|event| event.sequence() <= self.last);
         let Some(fresh) = batch.events.get(known..).filter(|fresh| !fresh.is_empty()) else {
             return ControlFlow::Continue(());
         };
         // The archive fills a hole, whatever made it.
-        let follows = std::iter::once(self.last).chain(fresh.iter().map(Prepared::sequence));
-        let whole = follows.zip(fresh).all(|(before, event)| event.sequence() == before.saturating_add(1));
-        match whole {
+        let follows = fresh.first().is_some_and(|event| event.sequence() == self.last.saturating_add(1));
+        match follows && follow_each_other(fresh) {
             true => self.tell(fresh).await,
             false => self.replay().await,
         }

@@ -98,6 +98,31 @@ async fn what_the_hub_left_out_is_read_from_the_archive() {
 }
 
 #[tokio::test]
+async fn what_was_said_lately_is_told_without_the_archive() {
+    let (bench, address) = Bench::on_a_socket().await;
+    let mut witness = open(address, "?after=0&topics=events").await;
+    bench.hear(&heartbeat(1.0)).await;
+    bench.frames(1).await;
+    let mut stored = bench.store.events(&crate::storage::EventQuery::default()).await.unwrap();
+    // The archive does not know of it: who tells it has it at hand.
+    let mut last = stored.remove(0);
+    last.sequence += 1;
+    let newest = last.sequence;
+    assert_eq!(events(&mut witness, usize::try_from(newest - 1).unwrap()).await.last(), Some(&(newest - 1)));
+    bench.hub.publish(last);
+    assert_eq!(events(&mut witness, 1).await, [newest]);
+    let mut late = open(address, "?topics=events").await;
+    let hello = next(&mut late).await;
+    assert_eq!((&hello["last_sequence"], &hello["after"]), (&newest.into(), &newest.into()));
+    assert_eq!(next(&mut late).await["type"], "live");
+    let mut behind = open(address, "?topics=events&after=1").await;
+    assert_eq!(next(&mut behind).await["after"], 1);
+    let told = events(&mut behind, usize::try_from(newest - 1).unwrap()).await;
+    assert_eq!(told, (2..=newest).collect::<Vec<_>>());
+    assert_eq!(next(&mut behind).await["type"], "live");
+}
+
+#[tokio::test]
 async fn who_knows_more_than_the_archive_is_told_to_begin_anew() {
     let (_bench, address) = Bench::on_a_socket().await;
     let mut socket = open(address, "?after=4711").await;
