@@ -45,6 +45,12 @@ pub(super) struct Stale {
     pub(super) passes: bool,
 }
 
+impl Stale {
+    pub(super) fn any(self) -> bool {
+        self.limits || self.passes
+    }
+}
+
 /// Gathers. Keeps what it knew when something cannot be read.
 pub(super) struct Gatherer {
     pub(super) around: Surroundings,

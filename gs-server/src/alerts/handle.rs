@@ -11,6 +11,7 @@ use super::message;
 use super::target::{SendError, Target};
 use crate::clock::{BusyToken, Timer};
 use crate::config::TargetKind;
+use crate::hub::Hub;
 use crate::storage::{AlertBatch, Delivery, DeliveryState};
 
 /// Requests that may wait; more are refused.
@@ -134,6 +135,7 @@ pub struct AlertsHandle {
     pub(super) timer: Arc<dyn Timer>,
     pub(super) station: String,
     pub(super) simulated: bool,
+    pub(super) hub: Hub,
 }
 
 /// What others found, by who found it.
@@ -168,10 +170,14 @@ impl AlertsHandle {
     /// themselves, as a backup that failed.
     pub fn report(&self, reporter: &str, found: Option<Condition>) {
         let mut reported = self.reported.lock().unwrap_or_else(PoisonError::into_inner);
-        match found {
+        let before = match found.clone() {
             Some(condition) => reported.insert(reporter.to_owned(), condition),
             None => reported.remove(reporter),
         };
+        drop(reported);
+        if before != found {
+            self.hub.ring();
+        }
     }
 
     /// Does something with an alert. Comes back when it is durable.

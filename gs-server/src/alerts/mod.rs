@@ -5,7 +5,7 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | `task` | looks every two seconds, keeps, answers operators |
+//! | `task` | looks when something has changed or is due, keeps, answers operators |
 //! | `gather` | what the station's status does not tell: disk, clock, limits, passes |
 //! | `message` | alerts in words |
 //! | `outbox` | one for each target: sends, tries again, makes digests |

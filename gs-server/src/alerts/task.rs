@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mission::alert::{AlertKind, Alerts, Changes, Condition, Policy};
 use mission::record::{AuditRecord, EventKind, EventRecord, Record, Subject};
-use mission::{Accepted, IntentReceipt, Level, Now, SatelliteId, StationId, UtcUs};
+use mission::{Accepted, IntentReceipt, Level, MonoUs, Now, SatelliteId, StationId, UtcUs};
 use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
@@ -21,10 +21,10 @@ use crate::hub::Hub;
 use crate::lifecycle::Lifecycle;
 use crate::storage::{AlertBatch, EventQuery, FinalRun, Page, Scope, Store, StoreError, StoredEvent};
 
-/// It looks so often while things change, microseconds of the station's clock.
+/// Looks are at least this far apart, and this far in a pass, microseconds of the station's clock.
 const LOOK_US: u64 = 2_000_000;
-/// And so often while nothing does: each look without news doubles the wait up to this.
-const CALM_LOOK_US: u64 = 16_000_000;
+/// It looks at least so often, whatever is told or due.
+const LOOK_ANYHOW_US: u64 = 60_000_000;
 /// Batches that wait for the archive; while they do, nothing new is looked at.
 const UNKEPT: usize = 16;
 /// Events read from the archive at once.
@@ -51,6 +51,8 @@ pub(crate) struct AlertsTask {
     hub: Hub,
     timer: Arc<dyn Timer>,
     inbox: mpsc::Receiver<Request>,
+    /// Something has changed.
+    bell: mpsc::Receiver<BusyToken>,
     gatherer: Gatherer,
     handle: AlertsHandle,
     /// One for each outbox; a word that nobody has taken yet is enough.
@@ -67,6 +69,8 @@ struct Mind {
     /// The end of the last run that was looked at.
     runs_through: UtcUs,
     runs_stale: bool,
+    /// There are events that could not be looked at yet.
+    is_behind: bool,
     unkept: VecDeque<AlertBatch>,
 }
 
@@ -93,7 +97,9 @@ impl AlertsTask {
             timer: Arc::clone(&timer),
             station: watched.station.to_string(),
             simulated: config.is_simulated(),
+            hub: hub.clone(),
         };
+        let bell = hub.bell(Arc::clone(&timer), "alerts");
         let gatherer = Gatherer::new(config, &watched, store.folder(), Arc::clone(&handle.reported));
         let task = Self {
             policy,
@@ -103,6 +109,7 @@ impl AlertsTask {
             hub,
             timer,
             inbox,
+            bell,
             gatherer,
             handle: handle.clone(),
             news: Vec::new(),
@@ -141,7 +148,6 @@ impl AlertsTask {
 
     async fn run(mut self, mut awake: BusyToken, stop: CancellationToken) {
         let mut mind: Option<Mind> = None;
-        let mut wait_us = LOOK_US;
         loop {
             if mind.is_none() {
                 match self.remember().await {
@@ -152,24 +158,60 @@ impl AlertsTask {
                 }
             }
             if let Some(mind) = &mut mind {
-                let has_news = self.look(mind).await;
-                wait_us = if has_news { LOOK_US } else { (wait_us * 2).min(CALM_LOOK_US) };
+                self.look(mind).await;
             }
-            let sleep = self.timer.sleep_until(self.timer.now().mono.plus(wait_us));
-            drop(awake);
-            let request = tokio::select! {
-                () = stop.cancelled() => return,
-                busy = sleep => {
-                    awake = busy;
-                    None
-                }
-                request = self.inbox.recv() => {
-                    awake = self.timer.busy("alerts");
-                    request
-                }
-            };
+            let due = self.next_look(mind.as_ref());
+            let request;
+            match self.wait(awake, due, &stop).await {
+                Some(told) => (awake, request) = told,
+                None => return,
+            }
             if let Some(request) = request {
                 self.answer(mind.as_mut(), request).await;
+            }
+        }
+    }
+
+    /// When to look again if nothing is told before.
+    fn next_look(&self, mind: Option<&Mind>) -> MonoUs {
+        let now = self.timer.now();
+        let Some(mind) = mind.filter(|mind| mind.unkept.is_empty() && !mind.is_behind && !mind.runs_stale)
+        else {
+            return now.mono.plus(LOOK_US);
+        };
+        if self.gatherer.stale.any() {
+            return now.mono.plus(LOOK_US);
+        }
+        let judged = mission::alert::next_judgement(&self.engine.status(), now.utc);
+        let due = [mind.alerts.next_due(now), judged].into_iter().flatten().min();
+        let wait_us =
+            due.map_or(LOOK_ANYHOW_US, |due| u64::try_from(due.0.saturating_sub(now.utc.0)).unwrap_or(0));
+        now.mono.plus(wait_us.clamp(LOOK_US, LOOK_ANYHOW_US))
+    }
+
+    /// Waits until `due`, until shortly after the bell, or for a request. `None`: the server stops.
+    async fn wait(
+        &mut self,
+        awake: BusyToken,
+        due: MonoUs,
+        stop: &CancellationToken,
+    ) -> Option<(BusyToken, Option<Request>)> {
+        let soon = self.timer.now().mono.plus(LOOK_US);
+        let mut is_soon = due <= soon;
+        let mut sleep = self.timer.sleep_until(due);
+        drop(awake);
+        loop {
+            tokio::select! {
+                () = stop.cancelled() => return None,
+                busy = &mut sleep => return Some((busy, None)),
+                request = self.inbox.recv() => return Some((self.timer.busy("alerts"), request)),
+                Some(busy) = self.bell.recv() => {
+                    if !is_soon {
+                        is_soon = true;
+                        sleep = self.timer.sleep_until(soon);
+                    }
+                    drop(busy);
+                }
             }
         }
     }
@@ -189,20 +231,20 @@ impl AlertsTask {
             events_kept: events_through,
             runs_through,
             runs_stale: true,
+            is_behind: true,
             unkept: VecDeque::new(),
         };
         mind.keep_progress();
         Ok(mind)
     }
 
-    /// One look at everything; whether anything is new or about to count.
-    async fn look(&mut self, mind: &mut Mind) -> bool {
+    /// One look at everything.
+    async fn look(&mut self, mind: &mut Mind) {
         self.keep(mind).await;
         if mind.unkept.len() >= UNKEPT {
-            return true;
+            return;
         }
-        let before = mind.events_through;
-        self.take_events(mind).await;
+        mind.is_behind = !self.take_events(mind).await;
         if mind.runs_stale {
             self.take_runs(mind).await;
         }
@@ -215,28 +257,29 @@ impl AlertsTask {
         let status = self.engine.status();
         let conditions = mission::alert::judge(&status, around, &self.policy.thresholds, now.utc);
         let changes = mind.alerts.observe(now, &conditions);
-        let has_news = mind.events_through != before || !changes.is_empty() || mind.alerts.is_pending();
         self.put(mind, now, changes);
         self.keep(mind).await;
-        has_news || !mind.unkept.is_empty()
     }
 
-    /// Events since the last look.
-    async fn take_events(&mut self, mind: &mut Mind) {
+    /// Events since the last look; whether there are no more.
+    async fn take_events(&mut self, mind: &mut Mind) -> bool {
         loop {
             let page = Page { after: Some(mind.events_through), before: None, limit: EVENTS_PAGE };
             // Of several stations on one archive each tells of its own.
             let scope = Scope { station: Some(self.station.to_string()), ..Scope::default() };
             let query = EventQuery { page, scope, ..EventQuery::default() };
-            let Ok(found) = self.store.events(&query).await else { return };
+            let Ok(found) = self.store.events(&query).await else { return false };
             for event in &found {
                 self.take_event(mind, event);
             }
             if mind.events_through.saturating_sub(mind.events_kept) >= EVENTS_UNKEPT {
                 mind.keep_progress();
             }
-            if found.len() < EVENTS_PAGE as usize || mind.unkept.len() >= UNKEPT {
-                return;
+            if found.len() < EVENTS_PAGE as usize {
+                return true;
+            }
+            if mind.unkept.len() >= UNKEPT {
+                return false;
             }
         }
     }

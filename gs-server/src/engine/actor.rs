@@ -129,7 +129,9 @@ impl Engine {
             let now = self.timer.now();
             self.carry_out(now);
             let finishing = finish.is_cancelled();
-            self.status.look(&self.station, now, finishing);
+            if self.status.look(&self.station, now, finishing) {
+                self.hub.ring();
+            }
             if finishing && self.is_drained() {
                 return Ok(());
             }

@@ -30,10 +30,11 @@ impl StatusView {
         (self.changed && settled).then(|| self.last_look.plus(INTERVAL_US))
     }
 
-    /// Shows the status if it is time, it is durable, and it has changed. While storage fails only that is shown.
-    pub(super) fn look(&mut self, station: &Station, now: Now, at_once: bool) {
+    /// Shows the status if it is time, it is durable, and it has changed; whether it has. While storage fails only that
+    /// is shown.
+    pub(super) fn look(&mut self, station: &Station, now: Now, at_once: bool) -> bool {
         if !self.changed || (!at_once && now.mono.since(self.last_look) < INTERVAL_US) {
-            return;
+            return false;
         }
         let mut next = station.status(now);
         if station.is_settled() {
@@ -41,7 +42,7 @@ impl StatusView {
         } else if next.storage.failing.is_some() {
             next = Status { storage: next.storage, at: next.at, ..Status::clone(&self.sender.borrow()) };
         } else {
-            return;
+            return false;
         }
         self.last_look = now.mono;
         self.sender.send_if_modified(|shown| {
@@ -50,6 +51,6 @@ impl StatusView {
                 *shown = Arc::new(next);
             }
             !same
-        });
+        })
     }
 }

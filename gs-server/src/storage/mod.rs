@@ -63,9 +63,9 @@ pub(crate) use people::PeopleChange;
 pub use people::{ApprovalRow, LinkRow, SessionRow, StationLicenceRow, TokenRow, TransmissionRow, UserRow};
 pub use pg::{Leased, Others, Postgres};
 pub use read::{
-    Bucket, ChunkCame, ChunkState, CommandLife, CommandNow, CommandQuery, CommandThen, Counts, During, EventCount,
-    EventQuery, FrameCount, FrameQuery, Heard, HeardCounts, ImageBytes, ImageMap, LatestValue, Page, Sample,
-    Samples, Scope, Series, Span, TelemetryQuery,
+    Bucket, ChunkCame, ChunkState, CommandLife, CommandNow, CommandQuery, CommandThen, Counts, During,
+    EventCount, EventQuery, FrameCount, FrameQuery, Heard, HeardCounts, ImageBytes, ImageMap, LatestValue,
+    Page, Sample, Samples, Scope, Series, Span, TelemetryQuery,
 };
 pub use redecode::{RedecodeProgress, RedecodeReport};
 pub use rows::{

@@ -74,6 +74,16 @@ pub fn judge(status: &Status, around: &Surroundings, thresholds: &Thresholds, no
     found
 }
 
+/// When time alone may change what [`judge`] finds: now in a pass, else when the next one begins. What takes days, as the
+/// age of elements, is left out.
+#[must_use]
+pub fn next_judgement(status: &Status, now: UtcUs) -> Option<UtcUs> {
+    let passes =
+        status.satellites.iter().filter_map(|satellite| satellite.sky.as_ref()).flat_map(|sky| &sky.passes);
+    let ahead = passes.filter(|pass| pass.los_at.is_none_or(|los| now < los));
+    ahead.map(|pass| pass.aos_at.max(now)).min()
+}
+
 /// In view, and no frame for so many periods.
 fn beacon(
     satellite: &SatelliteStatus,

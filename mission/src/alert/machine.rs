@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::condition::{AlertKind, Condition};
 use super::model::Alert;
-use super::notice::{Notice, NoticeKind, news, notices, step_due};
+use super::notice::{Notice, NoticeKind, news, notices, step_at, step_due};
 use super::policy::{Policy, Rule};
-use crate::clock::{MonoUs, Now};
+use crate::clock::{MonoUs, Now, UtcUs};
 use crate::id::{AlertId, SatelliteId};
 use crate::level::Level;
 use crate::record::EventKind;
@@ -67,12 +67,6 @@ impl Alerts {
     /// The alerts that are not history.
     pub fn open(&self) -> impl Iterator<Item = &Alert> {
         self.tracks.values().filter_map(|track| track.alert.as_ref())
-    }
-
-    /// Whether a condition has begun or ended and waits for its rule's delay.
-    #[must_use]
-    pub fn is_pending(&self) -> bool {
-        self.tracks.values().any(|track| track.candidate.is_some())
     }
 
     /// What it goes by.
@@ -143,6 +137,24 @@ impl Alerts {
         changes
     }
 
+    /// When time alone changes something next, if nothing else happens: a delay is over, a shelf ends, a step of escalation
+    /// or a message is due, what is over closes.
+    #[must_use]
+    pub fn next_due(&self, now: Now) -> Option<UtcUs> {
+        let dues = self.tracks.iter().flat_map(|((rule, _), track)| {
+            let rule = self.policy.rule(rule);
+            let alert = track.alert.as_ref();
+            [
+                track.candidate.map(|candidate| weighed_at(candidate, alert, rule, now)),
+                alert.and_then(|alert| alert.shelved.as_ref()).map(|shelf| shelf.until),
+                alert.and_then(|alert| step_at(alert, &self.policy, rule)),
+                alert.and_then(|alert| alert.told).map(|told| told.at.plus(us_signed(self.policy.settle_s))),
+                alert.and_then(|alert| alert.returned_at).map(|at| at.plus(us_signed(self.policy.settle_s))),
+            ]
+        });
+        dues.flatten().filter(|due| *due > now.utc).min()
+    }
+
     /// Weighs what a track should be against what it is, over time.
     fn weigh(
         &mut self,
@@ -210,8 +222,9 @@ impl Alerts {
                 changes.note(&alert, level, "raised");
                 *none = Some(alert);
             }
-            // A milder level that lasted, and now it is gone: the next look sees it.
-            (Some(_), None, _) | (None, _, None) => {}
+            // A milder level that lasted, and now it is gone: that has to last, too.
+            (Some(_), None, _) => track.candidate = Some(Candidate { level: None, since: now.mono }),
+            (None, _, None) => {}
         }
     }
 
@@ -277,14 +290,22 @@ impl Alerts {
     }
 }
 
+/// When a candidate has lasted long enough.
+fn weighed_at(candidate: Candidate, alert: Option<&Alert>, rule: Option<&Rule>, now: Now) -> UtcUs {
+    let held = alert.filter(|alert| alert.active).map(|alert| alert.level);
+    let delay_s =
+        rule.map_or(0, |rule| if candidate.level > held { rule.on_delay_s } else { rule.off_delay_s });
+    let left_us = us(delay_s).saturating_sub(now.mono.since(candidate.since));
+    now.utc.plus(i64::try_from(left_us).unwrap_or(i64::MAX))
+}
+
 /// Over, and known to somebody, or of a kind that nobody needs to have known.
 fn is_over(alert: &Alert, rule: Option<&Rule>, policy: &Policy, now: Now) -> bool {
     if alert.acknowledged.is_some() {
         return true;
     }
     let returned = alert.returned_at.unwrap_or(alert.changed_at);
-    rule.is_some_and(|rule| !rule.latch)
-        && now.utc.0.saturating_sub(returned.0) >= i64::from(policy.settle_s) * 1_000_000
+    rule.is_some_and(|rule| !rule.latch) && now.utc.0.saturating_sub(returned.0) >= us_signed(policy.settle_s)
 }
 
 fn fresh(id: AlertId, key: &Key, condition: &Condition, level: Level, active: bool, now: Now) -> Alert {
@@ -315,6 +336,10 @@ fn fresh(id: AlertId, key: &Key, condition: &Condition, level: Level, active: bo
 
 const fn us(seconds: u32) -> u64 {
     seconds as u64 * 1_000_000
+}
+
+const fn us_signed(seconds: u32) -> i64 {
+    seconds as i64 * 1_000_000
 }
 
 impl Changes {

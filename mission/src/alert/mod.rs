@@ -33,7 +33,7 @@ mod retry;
 mod tests;
 
 pub use condition::{AlertKind, Condition};
-pub use judge::{LimitSeen, PassSeen, Surroundings, judge};
+pub use judge::{LimitSeen, PassSeen, Surroundings, judge, next_judgement};
 pub use machine::{Alerts, Changes};
 pub use model::{Alert, AlertState, Shelf, Signed, Told};
 pub use notice::{Notice, NoticeKind};

@@ -81,6 +81,15 @@ pub(super) fn news(alert: &mut Alert, policy: &Policy, now: UtcUs, ends: bool) -
     Some(kind)
 }
 
+/// When the next step of escalation is due.
+pub(super) fn step_at(alert: &Alert, policy: &Policy, rule: Option<&Rule>) -> Option<UtcUs> {
+    if !alert.wants_eyes() {
+        return None;
+    }
+    let step = policy.escalate_of(rule).get(usize::try_from(alert.escalated).ok()?)?;
+    Some(alert.waiting_since.plus(i64::from(step.after_min) * 60_000_000))
+}
+
 /// The step of escalation that is due; notes that it was taken.
 pub(super) fn step_due<'p>(
     alert: &mut Alert,
@@ -88,14 +97,10 @@ pub(super) fn step_due<'p>(
     rule: Option<&'p Rule>,
     now: UtcUs,
 ) -> Option<&'p [String]> {
-    if !alert.wants_eyes() {
+    if step_at(alert, policy, rule)? > now {
         return None;
     }
     let step = policy.escalate_of(rule).get(usize::try_from(alert.escalated).ok()?)?;
-    let waits_us = now.0.saturating_sub(alert.waiting_since.0);
-    if waits_us < i64::from(step.after_min) * 60_000_000 {
-        return None;
-    }
     alert.escalated = alert.escalated.saturating_add(1);
     Some(&step.to)
 }

@@ -157,7 +157,7 @@ async fn that_the_archive_takes_nothing_is_told_without_the_archive() {
     life.store.set_max_page_count(1).await.unwrap();
     while life.store.apply(&event(life.now(), Level::Normal, &"x".repeat(500))).await.is_ok() {}
     let failing = StorageStatus { failing: Some("the disk is full".into()), ..StorageStatus::default() };
-    life.status.send_replace(Arc::new(Status { storage: failing, ..status(LinkState::Ok) }));
+    life.show(Status { storage: failing, ..status(LinkState::Ok) });
     for _ in 0..200 {
         life.pass(5).await;
         if hook.count() > 0 {
@@ -167,7 +167,7 @@ async fn that_the_archive_takes_nothing_is_told_without_the_archive() {
     let told = hook.wait(1).await.remove(0);
     assert!(told.body.contains("the disk is full"), "{}", told.body);
     life.store.set_max_page_count(1_000_000).await.unwrap();
-    life.status.send_replace(Arc::new(status(LinkState::Ok)));
+    life.show(status(LinkState::Ok));
     life.pass(5 * MINUTE).await;
     let rows = life.deliveries().await;
     assert_eq!(rows.iter().filter(|row| row.message_id == told.header("webhook-id")).count(), 1);

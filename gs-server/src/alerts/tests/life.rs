@@ -16,14 +16,14 @@ async fn a_lost_link_is_an_alert_after_half_a_minute_and_over_a_minute_after_it_
     let life = Life::begin(&folder, "", UtcUs(NOON_US)).await;
     life.pass(10).await;
     assert_eq!(life.alerts().await, []);
-    life.status.send_replace(Arc::new(status(LinkState::Unavailable { reason: "unplugged".into() })));
+    life.show(status(LinkState::Unavailable { reason: "unplugged".into() }));
     life.pass(25).await;
     assert_eq!(life.alerts().await, []);
     life.pass(12).await;
     let alerts = life.alerts().await;
     assert_eq!((alerts.len(), alerts[0].state()), (1, AlertState::Unacknowledged));
     assert_eq!((alerts[0].level, alerts[0].subject.as_str()), (Level::Warning, "e22"));
-    life.status.send_replace(Arc::new(status(LinkState::Ok)));
+    life.show(status(LinkState::Ok));
     life.pass(70).await;
     assert_eq!(life.alerts().await[0].state(), AlertState::Returned);
     let done = life.handle.act(alerts[0].id, Action::Acknowledge, None, who()).await.unwrap();

@@ -37,6 +37,7 @@ struct Life {
     store: Store,
     clock: Arc<SteppedClock>,
     status: watch::Sender<Arc<Status>>,
+    hub: Hub,
     /// The test's hand on the clock.
     hold: Mutex<Option<BusyToken>>,
     runtime: Option<tokio::runtime::Runtime>,
@@ -145,6 +146,7 @@ impl Life {
             }
         };
         let timer: Arc<dyn Timer> = clock.clone();
+        let hub = Hub::new();
         let (task, handle) = AlertsTask::new(AlertsParts {
             config: &config,
             watched: Watched::of(&station()),
@@ -156,7 +158,7 @@ impl Life {
                 status: receiver,
                 timer: Arc::clone(&timer),
             },
-            hub: Hub::new(),
+            hub: hub.clone(),
             timer,
         })
         .unwrap();
@@ -166,7 +168,13 @@ impl Life {
             task.spawn(&Lifecycle::new(&stop));
         }
         let hold = Mutex::new(Some(hold));
-        Self { handle, store, clock, status: sender, hold, runtime: Some(runtime) }
+        Self { handle, store, clock, status: sender, hub, hold, runtime: Some(runtime) }
+    }
+
+    /// The station's status is another, and says so as the engine does.
+    fn show(&self, status: Status) {
+        self.status.send_replace(Arc::new(status));
+        self.hub.ring();
     }
 
     fn report(&self, level: Level) {

@@ -1,5 +1,6 @@
 //! The machine by itself, in stepped time.
 
+mod due;
 mod escalation;
 mod life;
 mod noise;
