@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{AlarmReported, AuditView, CommandReported, LimitView, PacketCount, RunView, StationView, Time};
+use crate::{
+    AlarmReported, AlertView, AuditView, CommandReported, LimitView, PacketCount, RunView, StationView, Time,
+};
 
 /// What the next shift must know: the station now, and what happened since the last one began.
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
@@ -14,6 +16,8 @@ pub struct HandoverReport {
     pub at: Time,
     /// The station now; its passes to come are in it.
     pub now: StationView,
+    /// Alerts that are open now, the oldest first.
+    pub alerts: Vec<AlertView>,
     /// Values that are outside their limits now.
     pub limits: Vec<LimitView>,
     /// Passes since then, in order, those that last included.

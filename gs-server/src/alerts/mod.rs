@@ -9,6 +9,7 @@
 //! | `gather` | what the station's status does not tell: disk, clock, limits, passes |
 //! | `message` | alerts in words |
 //! | `outbox` | one for each target: sends, tries again, makes digests |
+//! | `view` | an alert as it goes over the wire |
 //! | `target` | e-mail, webhook, Matrix, Slack, Discord: one attempt each |
 //!
 //! A message is durable before it is sent, and carries a number that is the same in each attempt: after a crash it may
@@ -20,6 +21,7 @@ mod message;
 mod outbox;
 mod target;
 mod task;
+mod view;
 
 #[cfg(test)]
 pub(crate) mod catchers;
@@ -30,3 +32,4 @@ pub(crate) use gather::Watched;
 pub use handle::{Acted, Action, ActionFailure, AlertsHandle, TargetNow, TestFailure};
 pub(crate) use message::shape;
 pub(crate) use task::{AlertsParts, AlertsTask};
+pub(crate) use view::view;

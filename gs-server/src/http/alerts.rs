@@ -8,16 +8,16 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::HeaderValue;
 use axum::response::{IntoResponse as _, Response};
-use mission::alert::{ActionError, Alert};
+use mission::alert::ActionError;
 use mission::{AlertId, Level, UtcUs};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::App;
-use super::extract::{Id, Name, Query, during, page, paged, time, whole};
+use super::extract::{Id, Name, Query, during, page, paged, whole};
 use super::problem::Failure;
 use super::write::{IDEMPOTENCY_REPLAYED, Write};
-use crate::alerts::{Action, ActionFailure, TestFailure};
+use crate::alerts::{Action, ActionFailure, TestFailure, view};
 use crate::config::TargetKind;
 use crate::storage::AlertQuery;
 
@@ -155,33 +155,6 @@ const fn kind(kind: TargetKind) -> &'static str {
         TargetKind::Matrix => "matrix",
         TargetKind::Slack => "slack",
         TargetKind::Discord => "discord",
-    }
-}
-
-fn view(alert: &Alert) -> AlertView {
-    let at = |at: Option<UtcUs>| at.map(|at| time(at.0));
-    AlertView {
-        id: alert.id.0,
-        state: alert.state().name().to_owned(),
-        level: alert.level.name().to_owned(),
-        worst: alert.worst.name().to_owned(),
-        active: alert.active,
-        rule: alert.rule.clone(),
-        kind: alert.kind.name().to_owned(),
-        subject: alert.subject.clone(),
-        satellite: alert.satellite.as_ref().map(ToString::to_string),
-        message: alert.message.clone(),
-        times: alert.times,
-        raised_at: time(alert.raised_at.0),
-        changed_at: time(alert.changed_at.0),
-        returned_at: at(alert.returned_at),
-        acknowledged_by: alert.acknowledged.as_ref().map(|signed| signed.who.to_string()),
-        acknowledged_at: at(alert.acknowledged.as_ref().map(|signed| signed.at)),
-        shelved_until: at(alert.shelved.as_ref().map(|shelf| shelf.until)),
-        shelved_by: alert.shelved.as_ref().map(|shelf| shelf.who.to_string()),
-        assignee: alert.assignee.clone(),
-        note: alert.note.clone(),
-        closed_at: at(alert.closed_at),
     }
 }
 

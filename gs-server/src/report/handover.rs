@@ -63,6 +63,7 @@ pub async fn handover_report(
     Ok(HandoverReport {
         since: time(since_us),
         at: now.at,
+        alerts: store.open_alerts().await?.0.iter().map(crate::alerts::view).collect(),
         limits: limits
             .map(|row| LimitView {
                 satellite: row.satellite,

@@ -1,15 +1,15 @@
 //! Handovers and months in words.
 
 use api::{
-    CommandReported, HandoverReport, MonthOfSatellite, MonthReport, PassBrief, RunView, SatelliteView,
-    WordCount,
+    AlertView, CommandReported, HandoverReport, MonthOfSatellite, MonthReport, PassBrief, RunView,
+    SatelliteView, WordCount,
 };
 
 use super::document::Block::{Facts, Heading, List, Paragraph, Plots};
 use super::document::Side::{Left, Right};
 use super::document::{Block, Cell, Document, Table};
 use super::plots::days;
-use super::words::{airtime, alarms, clock, lasting, moment, unknown};
+use super::words::{age, airtime, alarms, clock, lasting, moment, unknown};
 
 /// A handover as headings and tables.
 #[must_use]
@@ -51,7 +51,7 @@ fn satellite_now(satellite: &SatelliteView) -> Vec<(&'static str, String)> {
         (
             "Elements",
             satellite.elements.as_ref().map_or_else(unknown, |elements| {
-                format!("{:.1} days old, AOS within {:.0} s", elements.age_days, elements.timing_error_s)
+                format!("{}, AOS within {:.1} s", age(elements.age_days), elements.timing_error_s)
             }),
         ),
         (
@@ -91,6 +91,9 @@ fn station_now(report: &HandoverReport) -> Vec<String> {
 
 fn open(report: &HandoverReport) -> Vec<Block> {
     let mut blocks = Vec::new();
+    if !report.alerts.is_empty() {
+        blocks.push(alerts(&report.alerts));
+    }
     if !report.limits.is_empty() {
         let mut table = Table::new(&[
             ("Limit", Left),
@@ -119,9 +122,31 @@ fn open(report: &HandoverReport) -> Vec<Block> {
         }
     }
     if blocks.is_empty() {
-        blocks.push(Paragraph("No limit is open, and no command is on its way or unknown.".to_owned()));
+        blocks.push(Paragraph(
+            "No alert or limit is open, and no command is on its way or unknown.".to_owned(),
+        ));
     }
     blocks
+}
+
+fn alerts(open: &[AlertView]) -> Block {
+    let columns = [("Alert", Left), ("Level", Left), ("Since", Left), ("What", Left), ("Who knows", Left)];
+    let mut table = Table::new(&columns);
+    for alert in open {
+        let shelved = alert.shelved_until.map(|until| format!("on the shelf until {}", moment(until)));
+        let known = alert.acknowledged_by.as_ref().map(|who| format!("known to {who}"));
+        let mine = alert.assignee.as_ref().map(|who| format!("{who}'s"));
+        let said: Vec<String> = [shelved, known, mine, alert.note.clone()].into_iter().flatten().collect();
+        let over = if alert.active { "" } else { " (over)" };
+        table.rows.push(vec![
+            Cell::Text(alert.id.to_string()),
+            Cell::Level(alert.level.clone()),
+            Cell::Text(moment(alert.raised_at)),
+            Cell::Text(format!("{}{over}", alert.message)),
+            Cell::Text(if said.is_empty() { "nobody yet".to_owned() } else { said.join("; ") }),
+        ]);
+    }
+    Block::Table(table)
 }
 
 fn commands_table(commands: &[CommandReported]) -> Block {

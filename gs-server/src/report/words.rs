@@ -51,6 +51,12 @@ pub fn pass_document(report: &PassReport) -> Document {
     }
 }
 
+/// The age of elements: those of a launch to come, or of one's own making, may have their epoch ahead.
+pub(super) fn age(days: f64) -> String {
+    let side = if days < -0.05 { "before their epoch" } else { "old" };
+    format!("{:.1} days {side}", days.abs())
+}
+
 fn facts(report: &PassReport) -> Vec<(&'static str, String)> {
     let (planned, had) = (&report.planned, &report.had);
     let mut facts = vec![
@@ -62,7 +68,7 @@ fn facts(report: &PassReport) -> Vec<(&'static str, String)> {
         (
             "Elements",
             match (planned.elements, planned.elements_age_days) {
-                (Some(id), Some(days)) => format!("set {id}, {days:.1} days old"),
+                (Some(id), Some(days)) => format!("set {id}, {}", age(days)),
                 _ => unknown(),
             },
         ),

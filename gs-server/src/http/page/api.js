@@ -26,6 +26,11 @@ export const forgetSession = () => {
 /** Whether writes have somebody behind them. */
 export const maySend = () => token !== null || (session?.rights.includes("command") ?? false);
 
+/** Whether the session may say yes for somebody else; the token is a machine's and may not. */
+export const mayApprove = () => token === null && (session?.rights.includes("approve") ?? false);
+/** Who is logged in. */
+export const person = () => (session?.csrf ? session.name : null);
+
 export const mayPlan = () => token !== null || (session?.rights.includes("plan") ?? false);
 
 /** An address of this server with the token in its fragment, which never leaves the browser. */

@@ -1,5 +1,7 @@
 // The plan page: who gets which pass of the coming days and why, what is armed, and what became of it.
 import { get } from "./api.js";
+import { paintApprovals, refreshApprovals, wireApprovals } from "./approvals.js";
+import { beginPage } from "./begin.js";
 import { paintComing } from "./coming.js";
 import { paintDays } from "./days.js";
 import { atMostEvery, byId, say } from "./dom.js";
@@ -8,9 +10,8 @@ import { paintToken, wireToken } from "./hands.js";
 import { paintHeld } from "./held.js";
 import { model, now, takeStation } from "./model.js";
 import { paintNotice } from "./notice.js";
-import { refreshSession, wireSession } from "./session.js";
+import { wireSession } from "./session.js";
 import { refreshRuns } from "./runs.js";
-import { follow } from "./stream.js";
 import { agenda, inOrder } from "./agenda.js";
 
 const HOUR_MS = 3600000;
@@ -23,6 +24,7 @@ wireToken((told) => {
   paintAll();
 });
 wireSession(paintAll);
+wireApprovals();
 window.addEventListener("resize", atMostEvery(200, async () => paintDays()));
 
 const refresh = atMostEvery(1000, async () => {
@@ -75,51 +77,26 @@ function onEvent(event) {
   if (event.kind === "command-stage") refreshRuns();
 }
 
-async function begin() {
-  if (!(await refreshSession())) {
-    location.replace("/login");
-    return;
-  }
-  const [station, events] = await Promise.all([get("station"), get("events?limit=1")]);
-  takeStation(station);
+function refreshAll() {
   refresh();
   refreshRuns();
-  follow(events.items[0]?.sequence ?? 0, {
-    event: onEvent,
-    status: takeStation,
-    open() {
-      model.live = true;
-      model.awaySince = null;
-      refresh();
-      refreshRuns();
-      paintNotice();
-    },
-    away() {
-      model.live = false;
-      model.awaySince ??= Date.now();
-      paintNotice();
-    },
-    reset() {},
-  });
-  setInterval(() => {
-    paintTop();
-    paintNotice();
-  }, 250);
-  setInterval(refresh, ANEW_MS);
-}
-
-async function beginUntilItWorks() {
-  for (;;) {
-    try {
-      await begin();
-      return;
-    } catch {
-      model.awaySince ??= Date.now();
-      paintNotice();
-      await new Promise((done) => setTimeout(done, 2000));
-    }
-  }
+  refreshApprovals();
 }
 
 inOrder(paintAll);
-beginUntilItWorks();
+beginPage({
+  history: 1,
+  started: refreshAll,
+  refresh: refreshAll,
+  event: onEvent,
+  status: takeStation,
+  paint() {
+    paintTop();
+    paintApprovals();
+    paintNotice();
+  },
+  reset() {},
+});
+setInterval(() => {
+  if (agenda.schedule) refresh();
+}, ANEW_MS);

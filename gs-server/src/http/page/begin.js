@@ -1,0 +1,51 @@
+// How a page begins: somebody is there, the station is read, the stream is followed; and again until the server is there.
+import { get } from "./api.js";
+import { model, takeStation } from "./model.js";
+import { paintNotice } from "./notice.js";
+import { refreshSession } from "./session.js";
+import { follow } from "./stream.js";
+
+const AGAIN_MS = 2000;
+
+/**
+ * `history`: how many of the newest events the page wants first, oldest first, in `started`.
+ * `refresh`: reads what only events change; called whenever the stream opens.
+ */
+export async function beginPage({ history, started, refresh, event, status, paint, reset }) {
+  const begin = async () => {
+    if (!(await refreshSession())) {
+      location.replace("/login");
+      return;
+    }
+    const [station, events] = await Promise.all([get("station"), get(`events?limit=${history}`)]);
+    takeStation(station);
+    started(events.items.toReversed());
+    follow(events.items[0]?.sequence ?? 0, {
+      event,
+      status,
+      open() {
+        model.live = true;
+        model.awaySince = null;
+        refresh();
+        paint();
+      },
+      away() {
+        model.live = false;
+        model.awaySince ??= Date.now();
+        paint();
+      },
+      reset,
+    });
+    setInterval(paint, 250);
+  };
+  for (;;) {
+    try {
+      await begin();
+      return;
+    } catch {
+      model.awaySince ??= Date.now();
+      paintNotice();
+      await new Promise((done) => setTimeout(done, AGAIN_MS));
+    }
+  }
+}
