@@ -2,7 +2,8 @@
 //! may be there, renewed meanwhile, given back after.
 //!
 //! The engine is told how long a lease holds by its own clock, counted from before the question: it never believes longer
-//! than the database does. Without an answer it believes nothing new, and the lease ends by itself.
+//! than the database does. Without an answer it believes nothing new, and the lease ends by itself; it is asked for again
+//! each second until there is one.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -40,6 +41,8 @@ struct Held {
     age: u32,
     /// Ticks since somebody wanted it.
     idle: u32,
+    /// The database did not answer when it was asked last.
+    failing: bool,
     told: String,
 }
 
@@ -76,6 +79,8 @@ impl Leases {
         held.idle = if wanted { 0 } else { held.idle.saturating_add(u32::from(ticked)) };
         let keep = wanted || (held.ours && held.idle < IDLE_TICKS);
         let due = match (held.ours, keep) {
+            // Not at every change of the status.
+            _ if held.failing => ticked && (keep || held.ours),
             (true, true) => held.age >= RENEW_TICKS,
             (true, false) => true,
             // Somebody else's: not at every change of the status.
@@ -99,10 +104,18 @@ impl Leases {
             Ok(Some(Leased::Free)) => (false, Lease::NotOurs { why: waiting(key) }),
             Ok(None) => return,
             Err(error) => {
-                tracing::warn!(%key, "the lease of key {key} cannot be asked for: {error}");
+                if std::mem::replace(&mut held.failing, true) {
+                    tracing::debug!(%key, "the lease of key {key} still cannot be asked for: {error}");
+                } else {
+                    tracing::warn!(%key, "the lease of key {key} cannot be asked for: {error}; trying again");
+                }
                 return;
             }
         };
+        if std::mem::take(&mut held.failing) {
+            let now = if ours { "is ours again" } else { "is not ours" };
+            tracing::info!(%key, "the lease of key {key} {now}: the database answers again");
+        }
         held.ours = ours;
         held.age = 0;
         let told = format!("{lease:?}");

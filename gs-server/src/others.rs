@@ -14,39 +14,30 @@ use crate::storage::{Others, Store, StoreError, StoredEvent};
 /// Before a lost connection is tried again: twice as long each time, up to the second.
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(30));
 
-/// Publishes what other stations commit, until `stop`. Ours comes from the engine.
-/// What they heard of our satellites goes to the engine.
-pub(crate) async fn follow(
-    store: Store,
-    own: StationId,
-    hub: Hub,
-    engine: EngineInbox,
-    stop: CancellationToken,
-) {
-    let follower = Follower { store, own, hub, engine };
-    tokio::select! {
-        () = stop.cancelled() => {}
-        () = follower.run() => {}
-    }
-}
-
-struct Follower {
-    store: Store,
-    own: StationId,
-    hub: Hub,
-    engine: EngineInbox,
+/// Publishes what other stations commit. Ours comes from the engine. What they heard of our satellites goes to the engine.
+pub(crate) struct Follower {
+    pub(crate) store: Store,
+    pub(crate) own: StationId,
+    pub(crate) hub: Hub,
+    pub(crate) engine: EngineInbox,
 }
 
 impl Follower {
-    async fn run(&self) {
-        let mut place = None;
+    /// Follows from this place of the events on, until `stop`.
+    pub(crate) async fn follow(self, place: i64, stop: CancellationToken) {
+        tokio::select! {
+            () = stop.cancelled() => {}
+            () = self.run(place) => {}
+        }
+    }
+
+    async fn run(&self, mut place: i64) {
         let mut pause = BACK_OFF.0;
         loop {
-            match self.connect(&mut place).await {
+            match self.store.others(place).await {
                 Ok(Some(mut others)) => {
                     pause = BACK_OFF.0;
-                    let error = self.tell(&mut others).await;
-                    place = Some(others.place());
+                    let error = self.tell(&mut others, &mut place).await;
                     tracing::warn!("other stations cannot be followed: {error}; trying again");
                 }
                 Ok(None) => return,
@@ -55,14 +46,6 @@ impl Follower {
             wall_sleep(pause).await;
             pause = (pause * 2).min(BACK_OFF.1);
         }
-    }
-
-    async fn connect(&self, place: &mut Option<i64>) -> Result<Option<Others>, StoreError> {
-        let after = match *place {
-            Some(after) => after,
-            None => *place.insert(self.store.last_event_seq().await?),
-        };
-        self.store.others(after).await
     }
 
     /// What they heard may belong to an image of ours.
@@ -76,8 +59,8 @@ impl Follower {
         Ok(())
     }
 
-    /// Tells what comes until it fails.
-    async fn tell(&self, others: &mut Others) -> StoreError {
+    /// Tells what comes until it fails, and how far it came.
+    async fn tell(&self, others: &mut Others, place: &mut i64) -> StoreError {
         loop {
             // First the archive: what was committed before we listened is told by nobody.
             loop {
@@ -88,16 +71,21 @@ impl Follower {
                 if events.is_empty() {
                     break;
                 }
-                for event in events.into_iter().filter(|event| event.record.station != self.own) {
-                    if let Err(error) = self.pass_on(&event).await {
-                        return error;
+                for event in events {
+                    let sequence = event.sequence;
+                    if event.record.station != self.own {
+                        if let Err(error) = self.pass_on(&event).await {
+                            return error;
+                        }
+                        self.hub.publish(event);
                     }
-                    self.hub.publish(event);
+                    *place = sequence;
                 }
             }
             if let Err(error) = others.wait().await {
                 return error;
             }
+            *place = others.place();
         }
     }
 }

@@ -18,7 +18,9 @@ use std::time::Duration;
 use futures_util::FutureExt as _;
 use futures_util::future::BoxFuture;
 use mission::port::ReservedFrame;
-use mission::{Clock as _, Entropy, Intent, LinkId, Principal, Snapshot, StationConfig, StationId, UtcUs};
+use mission::{
+    Clock as _, Entropy, FrameId, Intent, LinkId, Principal, Snapshot, StationConfig, StationId, UtcUs,
+};
 use protocol::Key;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
@@ -38,6 +40,7 @@ use crate::leases::Leases;
 use crate::lifecycle::Lifecycle;
 use crate::links::{self, LinkParts};
 use crate::ops::{sd, upkeep::UpkeepTask};
+use crate::others::Follower;
 use crate::people::{People, PeopleSettings};
 use crate::pointing::{Place, Steering};
 use crate::report::ReportTask;
@@ -192,6 +195,12 @@ pub async fn run_with(
     if !recovered.is_empty() {
         tracing::warn!(frames = recovered.len(), "{} raw frames come back from the reserve", recovered.len());
     }
+    // First the place: what is told after it comes live.
+    let told = store.last_event_seq().await?;
+    let elsewhere = images_elsewhere(&store, &station).await?;
+    if !elsewhere.is_empty() {
+        tracing::info!(frames = elsewhere.len(), "other stations heard {} frames of images", elsewhere.len());
+    }
     let entropy = match entropy {
         Some(entropy) => entropy,
         None => Box::new(OsEntropy::new().map_err(|source| RunError::Io { what: "no randomness", source })?),
@@ -209,6 +218,7 @@ pub async fn run_with(
         station,
         snapshot,
         recovered,
+        elsewhere,
         store: store.clone(),
         timer: Arc::clone(&timer),
         clock: config.station.clock,
@@ -251,7 +261,8 @@ pub async fn run_with(
             leases.run(stop).await;
             Ok(())
         });
-        let others = crate::others::follow(store.clone(), name, hub.clone(), inbox.clone(), api.soft.clone());
+        let follower = Follower { store: store.clone(), own: name, hub: hub.clone(), engine: inbox.clone() };
+        let others = follower.follow(told, api.soft.clone());
         api.spawn("other stations", async move {
             others.await;
             Ok(())
@@ -485,7 +496,24 @@ pub(crate) async fn open_store(
 }
 
 /// Owns what it reads with, as [`snapshot`] does.
-fn not_yet_stored(
+fn images_elsewhere(
+    store: &Store,
+    station: &StationConfig,
+) -> BoxFuture<'static, Result<Vec<(FrameId, ReservedFrame)>, StoreError>> {
+    let store = store.clone();
+    let satellites: Vec<_> = station.satellites.iter().map(|satellite| satellite.id.clone()).collect();
+    async move {
+        let mut frames = Vec::new();
+        for satellite in &satellites {
+            frames.extend(store.images_elsewhere(satellite).await?);
+        }
+        Ok(frames)
+    }
+    .boxed()
+}
+
+/// Owns what it reads with, as [`snapshot`] does.
+pub(crate) fn not_yet_stored(
     store: &Store,
     kept: Vec<ReservedFrame>,
 ) -> BoxFuture<'static, Result<Vec<ReservedFrame>, StoreError>> {

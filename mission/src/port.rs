@@ -69,6 +69,8 @@ pub enum Input<'a> {
         batch: BatchId,
         /// Why, as a sentence.
         reason: &'a str,
+        /// After so many microseconds it is to be tried again.
+        again_us: u64,
     },
     /// The reserve could not keep a raw frame that was handed to it: it is in memory only.
     ReserveFailed {

@@ -138,8 +138,8 @@ impl Station {
                     self.event(now.utc, EventKind::Storage, Level::Normal, About::default(), message);
                 }
             }
-            Input::PersistFailed { batch, reason } => {
-                if self.journal.failed(now.mono, batch, reason) {
+            Input::PersistFailed { batch, reason, again_us } => {
+                if self.journal.failed(now.mono.plus(again_us), batch, reason) {
                     let message = format!(
                         "storage fails: {reason}. Nothing is transmitted; raw frames go to the reserve until it recovers"
                     );

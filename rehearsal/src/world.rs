@@ -525,7 +525,9 @@ impl World {
                 }
             }
             Due::Confirm(batch, true) => self.tell(Input::PersistDone(batch)),
-            Due::Confirm(batch, false) => self.tell(Input::PersistFailed { batch, reason: "disk full" }),
+            Due::Confirm(batch, false) => {
+                self.tell(Input::PersistFailed { batch, reason: "disk full", again_us: 1_000_000 })
+            }
             Due::Witness(key, counter) => {
                 if chaos.witness_fails > 0.0 && self.rng.random_bool(chaos.witness_fails) {
                     self.tell(Input::WitnessFailed { key, reason: "no space" });

@@ -67,6 +67,11 @@ pub trait Timer: mission::Clock {
 
     /// While the token is held a stepped clock stands still. `who` names the holder in diagnostics.
     fn busy(&self, who: &'static str) -> BusyToken;
+
+    /// Seconds of this clock in a second of the real world, for what goes on out there; 1 where the clock is stepped.
+    fn pace(&self) -> f64 {
+        1.0
+    }
 }
 
 /// Something that holds a stepped clock.

@@ -130,6 +130,10 @@ impl Timer for ScaledClock {
         until(self.origin, wall_us).map(|()| BusyToken::idle()).boxed()
     }
 
+    fn pace(&self) -> f64 {
+        self.speed
+    }
+
     fn busy(&self, _who: &'static str) -> BusyToken {
         BusyToken::idle()
     }

@@ -40,12 +40,13 @@ impl Offline {
         let store = archive(config, &station.station).await?;
         let timer = run::clock_for(config, run::newest_event(&store).await?);
         let snapshot = run::snapshot(&store, &station).await?;
-        let recovered = store.reserve_read().await?;
+        let recovered = run::not_yet_stored(&store, store.reserve_read().await?).await?;
         let entropy = OsEntropy::new().map_err(|source| RunError::Io { what: "no randomness", source })?;
         let (engine, _inbox, handle) = Engine::new(EngineParts {
             station,
             snapshot,
             recovered,
+            elsewhere: Vec::new(),
             store: store.clone(),
             timer: Arc::clone(&timer),
             clock: config.station.clock,

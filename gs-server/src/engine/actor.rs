@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use mission::port::ReservedFrame;
 use mission::{
-    Effect, Entropy, Input, Lease, MaybeRadiated, MonoUs, Now, Snapshot, Station, StationConfig, TxId,
+    Effect, Entropy, FrameId, Input, Lease, MaybeRadiated, MonoUs, Now, Snapshot, Station, StationConfig,
+    TxId,
 };
 use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
@@ -14,12 +15,13 @@ use super::handle::{EngineHandle, INTENTS, PROBES, Probe, Request};
 use super::intents::Intents;
 use super::log;
 use super::message::{EngineInbox, EngineMessage, INBOX, LinkCommand, LinkPort};
+use super::retry::Retry;
 use super::watch::StatusView;
 use crate::clock::{BusyToken, Timer, kernel_says_synchronised};
 use crate::config::ClockSetting;
 use crate::hub::Hub;
 use crate::ops::metrics::Metrics;
-use crate::storage::Store;
+use crate::storage::{Store, StoreError};
 
 /// How often the kernel is asked about its clock.
 const CLOCK_CHECK_US: u64 = 30_000_000;
@@ -32,6 +34,8 @@ pub struct EngineParts {
     pub snapshot: Snapshot,
     /// What the reserve kept; see [`Store::reserve_read`].
     pub recovered: Vec<ReservedFrame>,
+    /// What other stations heard meanwhile; see [`Store::images_elsewhere`].
+    pub elsewhere: Vec<(FrameId, ReservedFrame)>,
     /// Where records go.
     pub store: Store,
     /// The clock.
@@ -52,6 +56,11 @@ pub enum EngineError {
     /// A task of storage ended without an answer.
     #[error("storage died in the middle of its work")]
     Storage(#[source] tokio::task::JoinError),
+    /// Another server works as this station, or one took what this one had under way.
+    #[error(
+        "the database knows this server no longer; what it heard since is in the reserve, start it again"
+    )]
+    Replaced,
 }
 
 /// The actor.
@@ -69,16 +78,24 @@ pub(crate) struct Engine {
     intents: Intents,
     status: StatusView,
     background: Background,
+    retry: Retry,
+    replaced: bool,
 }
 
 impl Engine {
     /// The actor, the way in for links, and the handle for operators.
     pub(crate) fn new(parts: EngineParts) -> (Self, EngineInbox, EngineHandle) {
-        let EngineParts { station, snapshot, recovered, store, timer, clock, entropy, hub, links } = parts;
+        let EngineParts { station, snapshot, recovered, elsewhere, store, timer, clock, entropy, hub, links } =
+            parts;
         let now = timer.now();
         let mut station = Station::new(station, snapshot, entropy, now);
-        for frame in &recovered {
-            station.handle(now, Input::Recovered(frame));
+        let ours = recovered.iter().map(|frame| (frame.received_at, Input::Recovered(frame)));
+        let theirs =
+            elsewhere.iter().map(|(id, frame)| (frame.received_at, Input::Elsewhere { id: *id, frame }));
+        let mut late: Vec<_> = ours.chain(theirs).collect();
+        late.sort_by_key(|(at, _)| *at);
+        for (_, input) in late {
+            station.handle(now, input);
         }
         if store.is_shared() {
             for sealing in station.status(now).sealing {
@@ -107,6 +124,8 @@ impl Engine {
             intents: Intents::default(),
             status,
             background: Background::default(),
+            retry: Retry::default(),
+            replaced: false,
             timer: Arc::clone(&timer),
         };
         let inbox = EngineInbox { sender, timer: Arc::clone(&timer) };
@@ -134,6 +153,9 @@ impl Engine {
             }
             if finishing && self.is_drained() {
                 return Ok(());
+            }
+            if self.replaced && self.background.is_idle() {
+                return Err(EngineError::Replaced);
             }
             let due = [
                 self.station.next_wakeup(),
@@ -228,6 +250,7 @@ impl Engine {
     fn take_outcome(&mut self, outcome: Outcome) {
         match outcome {
             Outcome::Persisted { batch, result: Ok(events) } => {
+                self.retry.done();
                 for event in events {
                     log::event(&event);
                     self.hub.publish(event);
@@ -237,8 +260,9 @@ impl Engine {
             Outcome::Persisted { batch, result: Err(error) } => {
                 let reason = whole(&error);
                 self.metrics.not_stored();
-                tracing::error!(batch = batch.0, "storage takes nothing: {reason}");
-                self.handle(Input::PersistFailed { batch, reason: &reason });
+                self.replaced |= matches!(error, StoreError::Replaced);
+                let again_us = self.retry.failed(batch, &reason, self.timer.pace());
+                self.handle(Input::PersistFailed { batch, reason: &reason, again_us });
             }
             Outcome::Witness { key, counter, result: Ok(()) } => {
                 self.handle(Input::WitnessDone { key, counter })

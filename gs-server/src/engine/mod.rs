@@ -19,6 +19,7 @@ mod handle;
 mod intents;
 mod log;
 mod message;
+mod retry;
 mod watch;
 
 pub use actor::{EngineError, EngineParts};

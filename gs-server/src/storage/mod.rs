@@ -221,9 +221,11 @@ impl Store {
 
     async fn claim(&self, principal: &Principal, idempotency_key: &str) -> Result<(), StoreError> {
         let mut writer = self.0.writer.lock().await;
-        let Some(fence) = writer.fence() else { return Ok(()) };
         let mut connection = writer.begin().await?;
-        let claimed = fence.claim(&mut connection, principal.as_str(), idempotency_key).await;
+        let claimed = match writer.shared() {
+            Some(shared) => shared.claim(&mut connection, principal.as_str(), idempotency_key).await,
+            None => Ok(true),
+        };
         if writer.end(connection, claimed).await? { Ok(()) } else { Err(StoreError::Claimed) }
     }
 

@@ -113,6 +113,7 @@ pub(super) struct Shared {
     options: PgConnectOptions,
     number: i64,
     fence: Fence,
+    away: lease::Away,
     /// The last batch of this life that is stored, and the place of its first event.
     last: (i64, i64),
 }
@@ -231,7 +232,7 @@ pub(super) async fn open(
         .acquire_timeout(Duration::from_secs(10))
         .connect_lazy_with(reading);
     let fence = Fence { station: station.to_string(), life };
-    let shared = Shared { options: writing, number, fence, last: (0, 0) };
+    let shared = Shared { options: writing, number, fence, away: lease::Away::default(), last: (0, 0) };
     let writer = Writer::new(Connection::Pg(connection), Target::Pg(shared), station).await?;
     Ok((writer, Pool::Pg(readers), number))
 }

@@ -13,8 +13,6 @@ const DERIVED_BOUND: usize = 50_000;
 /// Above this many waiting records, raw frames find no place in memory either (the reserve has them if it had room),
 /// and nothing follows from them: a row that names a frame which is not stored would spoil its batch for ever.
 const FRAME_BOUND: usize = 100_000;
-/// How often a failed batch is tried again.
-const RETRY_US: u64 = 1_000_000;
 
 /// The batch that will hold what was pushed; durable once that batch is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -125,12 +123,12 @@ impl Journal {
         self.status.failing.take()
     }
 
-    /// Nothing of the batch is durable: it is kept and tried again. True when this is news.
-    pub(super) fn failed(&mut self, now: MonoUs, id: BatchId, reason: &str) -> bool {
+    /// Nothing of the batch is durable: it is kept and tried again then. True when this is news.
+    pub(super) fn failed(&mut self, again: MonoUs, id: BatchId, reason: &str) -> bool {
         if self.in_flight.as_ref().is_none_or(|batch| batch.id != id) {
             return false;
         }
-        self.retry_at = Some(now.plus(RETRY_US));
+        self.retry_at = Some(again);
         let is_news = self.status.failing.is_none();
         self.status.failing = Some(reason.to_owned());
         if is_news {

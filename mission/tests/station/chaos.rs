@@ -231,7 +231,11 @@ fn carry_out(world: &mut World, act: &Act, watch: &mut Watch) {
                 .iter()
                 .find_map(|e| if let Effect::Persist(b) = e { Some(b.id.0) } else { None });
             for batch in (0..4).filter(|batch| newest.is_some_and(|newest| *batch < newest)) {
-                world.handle(Input::PersistFailed { batch: BatchId(batch), reason: "late" });
+                world.handle(Input::PersistFailed {
+                    batch: BatchId(batch),
+                    reason: "late",
+                    again_us: 1_000_000,
+                });
             }
         }
         Act::StrayBatch(batch) => {

@@ -109,7 +109,7 @@ fn confirmations_of_things_that_nobody_asked_for_change_nothing() {
         reason: "",
     });
     world.handle(Input::WitnessDone { key, counter: protocol::Counter(5) });
-    world.handle(Input::PersistFailed { batch: mission::BatchId(77), reason: "" });
+    world.handle(Input::PersistFailed { batch: mission::BatchId(77), reason: "", again_us: 1_000_000 });
     world.unknown_batch();
     assert!(world.transmits.is_empty());
     assert!(world.station.status(world.now).storage.failing.is_none());

@@ -252,7 +252,10 @@ impl World {
     pub(crate) fn refuse(&mut self) {
         match self.waiting.pop_front().expect("something to refuse") {
             Effect::Persist(batch) => {
-                self.station.handle(self.now, Input::PersistFailed { batch: batch.id, reason: "disk full" });
+                self.station.handle(
+                    self.now,
+                    Input::PersistFailed { batch: batch.id, reason: "disk full", again_us: 1_000_000 },
+                );
             }
             Effect::Witness { key, .. } => {
                 self.station.handle(self.now, Input::WitnessFailed { key, reason: "disk full" });

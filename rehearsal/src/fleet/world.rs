@@ -461,7 +461,7 @@ impl Fleet {
             }
             Due::Confirm(batch, true) => ground.tell(now_us, Input::PersistDone(batch)),
             Due::Confirm(batch, false) => {
-                ground.tell(now_us, Input::PersistFailed { batch, reason: "disk full" });
+                ground.tell(now_us, Input::PersistFailed { batch, reason: "disk full", again_us: 1_000_000 });
             }
             Due::Witness(key, _) if now_us < ground.disk_until => {
                 ground.tell(now_us, Input::WitnessFailed { key, reason: "no space" });

@@ -130,6 +130,7 @@ impl Bench {
             station,
             snapshot,
             recovered: Vec::new(),
+            elsewhere: Vec::new(),
             store: store.clone(),
             timer: Arc::clone(&timer),
             clock: ClockSetting::Trust,

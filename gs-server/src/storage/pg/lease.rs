@@ -1,10 +1,12 @@
 //! Who may seal with a key, and who works on an intent: decided in the database, by its clock, in the transaction that
 //! needs it.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use protocol::{Counter, KeyId};
 
+use super::Shared;
 use crate::storage::convert::narrow;
 use crate::storage::db::{Connection, sql};
 use crate::storage::{Store, StoreError};
@@ -82,8 +84,8 @@ impl Fence {
         Ok(LEASE_US)
     }
 
-    /// Takes the intent for this server, within the transaction. False when another server that still works has it.
-    pub(in crate::storage) async fn claim(
+    /// Takes the intent for this server, within the transaction. False when another server has it that was not replaced.
+    async fn claim(
         &self,
         connection: &mut Connection,
         principal: &str,
@@ -98,6 +100,67 @@ impl Fence {
         .execute(connection)
         .await?;
         Ok(taken > 0)
+    }
+}
+
+/// Stations that were found to be away from the database: by their life, since when in microseconds of its clock.
+#[derive(Debug, Default)]
+pub(super) struct Away(BTreeMap<String, i64>);
+
+impl Away {
+    /// Whether this life has been away for as long as a lease lasts, counted from when that was first noticed.
+    fn is_over(&mut self, life: &str, now_us: i64) -> bool {
+        now_us - *self.0.entry(life.to_owned()).or_insert(now_us) >= LEASE_US
+    }
+}
+
+impl Shared {
+    /// Takes the intent for this server, within the transaction. False when another server works on it. One that has been
+    /// away for as long as a lease lasts loses it, and its station with it: if it was only cut off it finds out at its
+    /// next batch, and what it still had under way is not stored a second time.
+    pub(in crate::storage) async fn claim(
+        &mut self,
+        connection: &mut Connection,
+        principal: &str,
+        idempotency_key: &str,
+    ) -> Result<bool, StoreError> {
+        if self.fence.claim(connection, principal, idempotency_key).await? {
+            return Ok(true);
+        }
+        let row = sql(
+            "select number, stations.life as life from claims join stations on stations.life = claims.life
+             where principal = ? and idempotency_key = ?",
+        )
+        .bind(principal)
+        .bind(idempotency_key)
+        .fetch_one(&mut *connection)
+        .await?;
+        let (number, life): (i64, String) = (row.try_get("number")?, row.try_get("life")?);
+        let is_away: bool =
+            sql("select case when pg_try_advisory_xact_lock(?) then 1::bigint else 0::bigint end")
+                .bind(super::AT_WORK + number)
+                .scalar(&mut *connection)
+                .await?;
+        if !is_away {
+            self.away.0.remove(&life);
+            return Ok(false);
+        }
+        let now_us: i64 = sql(NOW_US).scalar(&mut *connection).await?;
+        if !self.away.is_over(&life, now_us) {
+            return Ok(false);
+        }
+        sql("update stations set life = '' where number = ?").bind(number).execute(&mut *connection).await?;
+        tracing::warn!(
+            number,
+            "station {number} has been away from the database: what it had under way is ours"
+        );
+        self.fence.claim(connection, principal, idempotency_key).await
+    }
+
+    /// Whoever is away now has been away for long.
+    #[cfg(test)]
+    pub(in crate::storage) fn wait_out(&mut self) {
+        self.away.0.values_mut().for_each(|since| *since -= LEASE_US);
     }
 }
 

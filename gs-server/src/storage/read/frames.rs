@@ -1,13 +1,14 @@
 //! Raw frames and who heard them.
 
+use mission::FrameId;
 use mission::port::ReservedFrame;
-use mission::{FrameId, UtcUs};
 
-use super::super::convert::{int, route};
+use super::super::convert::int;
 use super::super::db::sql;
 use super::super::row::Row as _;
 use super::super::row::select;
 use super::super::{FrameRow, ReceptionRow, Store, StoreError};
+use super::elsewhere::as_kept;
 use super::{List, Page, Scope, all, one};
 
 /// Which frames.
@@ -75,13 +76,7 @@ impl Store {
     pub async fn frame_as_kept(&self, id: FrameId) -> Result<Option<ReservedFrame>, StoreError> {
         let Some(heard) = self.frame(int("frame", id.0)?).await? else { return Ok(None) };
         let Some(first) = heard.receptions.first().filter(|_| !heard.frame.nested) else { return Ok(None) };
-        Ok(Some(ReservedFrame {
-            route: route(&first.satellite, &first.station, &first.link)?,
-            source: first.source()?,
-            received_at: UtcUs(heard.frame.heard_at_us),
-            rssi_dbm: first.rssi_dbm.and_then(|dbm| i16::try_from(dbm).ok()),
-            bytes: heard.frame.bytes.into(),
-        }))
+        as_kept(heard.frame, first).map(Some)
     }
 
     /// Those of these frames that the archive does not have: the reserve may hold some that were stored after all.

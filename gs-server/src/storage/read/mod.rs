@@ -3,6 +3,7 @@
 //! Readers have connections of their own and never wait for the writer.
 
 mod commands;
+mod elsewhere;
 mod events;
 mod frames;
 mod images;

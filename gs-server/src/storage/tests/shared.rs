@@ -160,6 +160,42 @@ async fn an_intent_is_taken_by_one_server() {
     assert_eq!(b.find_or_claim_intent(&ada, "twice").await.unwrap(), None, "its life is over");
 }
 
+/// Also when it never comes back; and if it does, it stores nothing of what it had under way.
+#[tokio::test]
+async fn what_a_dead_server_had_under_way_is_taken_after_the_time_of_a_lease() {
+    let (place, [a, b], _parent) = two().await;
+    let ada = Principal::new("ada");
+    assert_eq!(a.find_or_claim_intent(&ada, "once").await.unwrap(), None);
+    place
+        .meddle("select pg_terminate_backend(pid) from pg_stat_activity where datname = current_database() and application_name = 'gs-server writer'")
+        .await
+        .unwrap();
+    let claim = async || loop {
+        // Its own connection was cut, too.
+        match b.find_or_claim_intent(&ada, "once").await {
+            Err(StoreError::Claimed) => break Err(()),
+            Ok(found) => break Ok(found),
+            Err(error) => {
+                assert!(error.is_temporary() || matches!(error, StoreError::StationTaken), "{error:?}")
+            }
+        }
+    };
+    assert_eq!(claim().await, Err(()), "it has just gone away");
+    assert_eq!(claim().await, Err(()), "it has just gone away");
+    b.0.writer.lock().await.shared().unwrap().wait_out();
+    assert_eq!(claim().await, Ok(None), "it is ours");
+    // Now it is back.
+    let mut tries = 0;
+    let error = loop {
+        match a.apply(&batch(vec![Record::Intent(receipt("once", mission::Accepted::Done))])).await {
+            Err(error) if error.is_temporary() && tries < 20 => tries += 1,
+            other => break other.unwrap_err(),
+        }
+    };
+    assert!(matches!(error, StoreError::Replaced), "{error:?}");
+    b.apply(&batch(vec![Record::Intent(receipt("once", mission::Accepted::Done))])).await.unwrap();
+}
+
 /// Both want the same key at the same moment, a thousand times: one gets it, and seals.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_thousand_races_for_a_key_have_one_winner_each() {

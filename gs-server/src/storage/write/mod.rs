@@ -121,6 +121,14 @@ impl Writer {
         }
     }
 
+    /// What is known of the database that several servers share; `None` when it is ours alone.
+    pub(super) fn shared(&mut self) -> Option<&mut Shared> {
+        match &mut self.target {
+            Target::Lite(_) => None,
+            Target::Pg(shared) => Some(shared),
+        }
+    }
+
     /// Stores a batch; also where the audit ends then, when the batch added to it.
     pub(super) async fn apply(
         &mut self,
