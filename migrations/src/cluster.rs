@@ -184,6 +184,14 @@ impl Database {
         )
     }
 
+    /// Chunks of an image that are held more than once, as `image|index` lines.
+    ///
+    /// # Errors
+    /// What the server said against it.
+    pub fn chunks_held_twice(&self) -> io::Result<String> {
+        self.tell("select image, chunk_index from chunks group by image, chunk_index having count(*) > 1")
+    }
+
     /// Puts the rows of a table there in the place of those here, whatever triggers and references say.
     ///
     /// # Errors
