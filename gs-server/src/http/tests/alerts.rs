@@ -129,6 +129,14 @@ async fn a_mail_server_and_a_webhook_get_the_message_and_the_test() {
     assert_eq!(posted.header("webhook-id"), body["id"].as_str().unwrap());
     assert!(posted.header("webhook-signature").starts_with("v1,"), "{}", posted.header("webhook-signature"));
 
+    // That the message went through is written down before it is told.
+    for _ in 0..500 {
+        let kept = bench.store.deliveries(None, &Page::default()).await.unwrap();
+        if kept.len() == 2 && kept.iter().all(|row| row.state == "sent") {
+            break;
+        }
+        wall_sleep(Duration::from_millis(20)).await;
+    }
     for (key, answer) in [(500, "delivery-failed"), (403, "delivery-failed")] {
         hook.now_says(key);
         let failed = bench.post("/api/v1/alerts/targets/hook/test", &key.to_string(), &json!({})).await;
