@@ -13,6 +13,8 @@
 //! | [`journal`] | what the twin wrote down: the far end's own witness |
 //! | [`strace`] | system calls, as strace tells them |
 //! | [`watch`], [`operator`] | somebody who remembers what the server published; somebody who commands |
+//! | [`guide`], [`terminal`] | a page of the documentation as a list of things to do; the terminals to do them in |
+//! | [`mail`] | a mail catcher |
 //! | [`wait`] | waiting for the real world |
 //!
 //! Everything here is as far outside the server as an operator is: it knows the wire types (`api`), the radio link
@@ -22,14 +24,17 @@
 pub mod binary;
 pub mod crowd;
 pub mod folder;
+pub mod guide;
 pub mod http;
 pub mod journal;
+pub mod mail;
 pub mod operator;
 pub mod overhead;
 pub mod process;
 pub mod pty;
 pub mod strace;
 pub mod stream;
+pub mod terminal;
 pub mod wait;
 pub mod watch;
 

@@ -1,11 +1,16 @@
-//! A known key occurs nowhere outside its own file: not in the archive, its log, the reserve, the witness or the twin's
-//! journal, not in logs at trace level, not in an answer of the API, a message of the stream or the page.
+//! A known key occurs nowhere outside its own file: not in the archive, its log, the reserve, the witness, a backup or the
+//! twin's journal, not in logs at trace level, not in an answer of the API, a message of the stream or the page. The same for
+//! what people know, and for the passwords of the mail server and of the database.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot be set up has failed, loudly")]
 
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
 
 use api::{CommandView, DownloadView, Page};
 use end_to_end::folder::{KEY, key_hex};
+use end_to_end::mail::MailCatcher;
 use end_to_end::process::{gs_server, run};
 use end_to_end::stream::{Follower, Look};
 use end_to_end::wait::{PATIENCE, until};
@@ -112,6 +117,7 @@ fn the_scanner_finds_the_key_where_it_is() {
     assert!(found(b"AMD/7l7C5xM3utyrHt76ztU=") && found(b"wP/uXsLnEze63Kse3vrO1Q=="));
     assert!(found(&[b"....".as_slice(), &KEY[7..13], b"...."].concat()));
     assert!(!found(&[0; 64]) && !found(b"0123456789abcdef"));
+    assert!(base64(&KEY).starts_with("wP/uXsLnEze63Kse3vrO1Q"));
 }
 
 #[test]
@@ -181,6 +187,7 @@ fn the_key_stays_in_its_file() {
         assert_eq!(find(&answer.body, &spellings), None, "in an answer");
     }
     walk(&client, &spellings, false);
+    backup(&folder);
 
     // While it runs, with its write-ahead log; after `kill -9`; after an orderly end.
     let alive = scan(&folder, &spellings);
@@ -193,6 +200,7 @@ fn the_key_stays_in_its_file() {
         "twin.log",
         "twin.journal",
         "token",
+        "backup.tar",
     ] {
         assert!(names.contains(&wanted), "{wanted} is not among {names:?}");
     }
@@ -266,6 +274,7 @@ fn what_people_know_stays_with_them() {
     let seen = client.ask("GET", "/api/v1/session", &[("cookie", &cookie)], b"").expect("an answer");
     assert_eq!(seen.status, 200);
     walk(&client, &secrets, true);
+    backup(&folder);
     let look = |folder: &Folder| {
         let own = folder.data().join("token");
         for path in files(folder.path()).into_iter().filter(|path| *path != own) {
@@ -277,6 +286,149 @@ fn what_people_know_stays_with_them() {
     assert!(server.process.log().contains("TRACE"), "the log is not at trace level");
     server.process.kill9();
     look(&folder);
+}
+
+/// In Base64, as SMTP carries them.
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for three in bytes.chunks(3) {
+        let word = three.iter().fold(0_usize, |word, byte| word << 8 | usize::from(*byte))
+            << (8 * (3 - three.len()));
+        for place in 0..=three.len() {
+            text.push(char::from(DIGITS[word >> (18 - 6 * place) & 63]));
+        }
+    }
+    text
+}
+
+/// The station logs in to its mail server, well and badly; its password stands in its file and in the conversation alone.
+#[test]
+fn the_password_of_the_mail_server_stays_in_its_file() {
+    const PASSWORD: &str = "Vb3-another-unlikely-one-9Tq";
+    let catcher = MailCatcher::start();
+    let mut folder = Folder::new();
+    folder.log = "trace".to_owned();
+    folder.sections = format!(
+        "[[alerts.targets]]\nname = \"mail\"\nkind = \"email\"\nserver = \"{}\"\nsecurity = \"none\"\n\
+         from = \"ground@example.org\"\nto = [\"ops@example.org\"]\nuser = \"ground\"\nsecret_file = \"mail.password\"\n",
+        catcher.address
+    );
+    folder.write_key("mail.password", &format!("{PASSWORD}\n"), 0o600);
+    let login = base64(format!("\0ground\0{PASSWORD}").as_bytes());
+    // The last group of four holds what follows as well.
+    let secrets: Vec<(String, Vec<u8>)> = [
+        ("raw password", PASSWORD.to_owned()),
+        ("raw login", login[..login.len() - 4].to_owned()),
+        ("raw base64", base64(PASSWORD.as_bytes())),
+    ]
+    .into_iter()
+    .map(|(name, secret)| (name.to_owned(), secret.into_bytes()))
+    .collect();
+    let mut server = Server::start(&folder);
+    let client = server.client.clone();
+    let test = |key: &str| client.post("/api/v1/alerts/targets/mail/test", key, "{}").expect("an answer");
+    let sent = test("a");
+    assert_eq!(sent.status, 200, "{}", sent.text());
+    let said = catcher.said().join("\n");
+    assert!(secrets.iter().any(|(_, secret)| said.contains(&*String::from_utf8_lossy(secret))), "{said}");
+    catcher.refuse_logins();
+    let refused = test("b");
+    folder.write_key("mail.password", &format!("{PASSWORD}\n"), 0o644);
+    let exposed = test("c");
+    for answer in [&refused, &exposed] {
+        assert!(answer.status >= 400, "{}", answer.text());
+        assert_eq!(find(&answer.body, &secrets), None, "in an answer");
+    }
+    walk(&client, &secrets, true);
+    backup(&folder);
+    let look = |folder: &Folder| {
+        let own = folder.file("mail.password");
+        for path in files(folder.path()).into_iter().filter(|path| *path != own) {
+            let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            assert_eq!(find(&bytes, &secrets), None, "{}", path.display());
+        }
+    };
+    look(&folder);
+    assert!(server.process.log().contains("TRACE"), "the log is not at trace level");
+    server.process.kill9();
+    look(&folder);
+}
+
+/// Asks whoever connects for the password in the clear, as PostgreSQL may, keeps what was said, and refuses it.
+fn strict_database() -> (SocketAddr, Receiver<Vec<u8>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("its address");
+    let (told, heard) = channel();
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            // Whoever hung up said nothing; nobody listens any more when the test is over.
+            let _ = refuse(stream).map(|said| told.send(said));
+        }
+    });
+    (address, heard)
+}
+
+fn refuse(mut stream: TcpStream) -> std::io::Result<Vec<u8>> {
+    let mut piece = [0; 4096];
+    let _startup = stream.read(&mut piece)?;
+    // AuthenticationCleartextPassword
+    stream.write_all(b"R\0\0\0\x08\0\0\0\x03")?;
+    let count = stream.read(&mut piece)?;
+    let fields = b"SFATAL\0VFATAL\0C28P01\0Mpassword authentication failed for user \"ground\"\0\0";
+    stream.write_all(b"E")?;
+    stream.write_all(&(4 + fields.len() as u32).to_be_bytes())?;
+    stream.write_all(fields)?;
+    Ok(piece[..count].to_vec())
+}
+
+#[test]
+fn the_password_of_the_database_stays_in_its_file() {
+    const PASSWORD: &str = "Kc5-a-database-of-secrets-2Wd";
+    let secrets = [("raw password".to_owned(), PASSWORD.as_bytes().to_vec())];
+    let (address, heard) = strict_database();
+    let mut folder = Folder::new();
+    folder.write_key("database.password", &format!("{PASSWORD}\n"), 0o600);
+    let ask = |folder: &Folder, verb: &[&str]| {
+        let config = folder.write_config();
+        let mut command = gs_server(["--log", "trace"]);
+        command.args(verb).arg("--config").arg(config);
+        let (code, out, error) = run(command);
+        assert_ne!(code, 0, "{verb:?}: {out}");
+        let all = format!("{out}{error}");
+        assert_eq!(find(all.as_bytes(), &secrets), None, "{verb:?}: {all}");
+        all
+    };
+    folder.storage = format!(
+        "database = \"postgres://ground@{address}/ground?sslmode=disable\"\npassword_file = \"database.password\"\n"
+    );
+    let told = ask(&folder, &["serve"]);
+    assert!(told.contains("the archive cannot be opened"), "{told}");
+    let said = heard.recv().expect("what it was asked with");
+    assert!(find(&said, &secrets).is_some(), "the password was never used");
+    // A file that others may read, and a password where it does not belong: refused, and not repeated.
+    folder.write_key("database.password", &format!("{PASSWORD}\n"), 0o644);
+    ask(&folder, &["serve"]);
+    folder.storage = format!("database = \"postgres://ground:{PASSWORD}@{address}/ground\"\n");
+    ask(&folder, &["serve"]);
+    ask(&folder, &["config", "check"]);
+    folder.storage = format!("database = \"postgres://ground@{address}/ground?password={PASSWORD}\"\n");
+    ask(&folder, &["serve"]);
+    for path in files(folder.path()) {
+        if path == folder.file("database.password") || path == folder.file("station.toml") {
+            continue;
+        }
+        let bytes = std::fs::read(&path).expect("a file");
+        assert_eq!(find(&bytes, &secrets), None, "{}", path.display());
+    }
+}
+
+/// A backup of the server that runs, beside its data folder.
+fn backup(folder: &Folder) {
+    let mut command = gs_server(["backup", "--config"]);
+    command.arg(folder.file("station.toml")).arg(folder.file("backup.tar"));
+    let (code, out, error) = run(command);
+    assert_eq!(code, 0, "{out}{error}");
 }
 
 /// Every answer to a question, the page and all that it loads.

@@ -86,7 +86,7 @@ Example:
 
 The folder must not exist, or be empty. The backup is checked first. What was restored receives
 and shows everything, and seals nothing until an operator has confirmed the counter of each key:
-  POST /api/v1/keys/ID/confirm-counter
+  gs-server key confirm --config station.toml
 because counters may have been radiated that the backup does not know. See that the clock is right
 before: sealing goes on above it. The configuration of the backup is put beside the archive as
 restored-station.toml. Exit code 3 if the folder is not empty.")]

@@ -23,8 +23,14 @@ No secret is printed. Key files are looked at as `serve` would. Exit code 2 for 
 file, 3 for a key file that would be refused.")]
     Check(Check),
     /// Print an example configuration with every section explained
-    #[command(after_help = "Example:\n  gs-server config example > station.toml")]
-    Example,
+    #[command(after_help = "\
+Examples:
+  gs-server config example > station.toml
+  gs-server config example --practice > station.toml
+
+Without an option: a station with a radio module on a USB adapter, to be edited. With --practice one
+that runs as it is, beside `gs-server twin serve --pty radio`.")]
+    Example(Example),
 }
 
 /// `gs-server config check`.
@@ -35,6 +41,14 @@ pub struct Check {
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
+}
+
+/// `gs-server config example`.
+#[derive(Debug, Args)]
+pub struct Example {
+    /// A station beside the simulated satellite, ten times as fast as life
+    #[arg(long)]
+    practice: bool,
 }
 
 /// A configuration, with or without the name of the option.
@@ -65,12 +79,15 @@ struct Verdict {
 /// What `config example` prints.
 pub(super) const EXAMPLE: &str = include_str!("../../../examples/e22-usb.toml");
 
+/// The same for a station to practise with.
+const PRACTICE: &str = include_str!("../../../examples/practice.toml");
+
 impl Config {
     pub(super) fn run(self) -> Result<Exit, Failure> {
         match self {
             Self::Check(check) => check.run(),
-            Self::Example => {
-                print_line(EXAMPLE.trim_end())?;
+            Self::Example(example) => {
+                print_line(if example.practice { PRACTICE } else { EXAMPLE }.trim_end())?;
                 Ok(Exit::Done)
             }
         }
@@ -102,5 +119,9 @@ mod tests {
         let config = crate::config::Config::from_toml(EXAMPLE, std::path::Path::new("/srv/ground")).unwrap();
         config.check().unwrap();
         assert!(!config.is_simulated());
+        let practice =
+            crate::config::Config::from_toml(PRACTICE, std::path::Path::new("/srv/ground")).unwrap();
+        practice.check().unwrap();
+        assert!(practice.is_simulated());
     }
 }

@@ -1,14 +1,25 @@
-//! `gs-server key new|list`.
+//! `gs-server key new|list|confirm`.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use api::{Nothing, SealingView, StationView};
 use clap::{Args, Subcommand};
+use protocol::KeyId;
 use serde::Serialize;
 use zeroize::Zeroizing;
 
-use super::shell::{fill_random, print_json, print_line};
+use super::elements::Of;
+use super::plans::{failure, server};
+use super::shell::{fill_random, print_json, print_line, runtime};
 use super::{Exit, Failure};
+use crate::clock::wall_sleep;
+use crate::elements::{Remote, RemoteError};
 use crate::keys;
+
+/// A confirmed key is looked at so often, and so far apart, until it is unlocked.
+const LOOKS: u32 = 100;
+const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
 
 /// `gs-server key`.
 #[derive(Debug, Subcommand)]
@@ -31,6 +42,16 @@ Examples:
 
 Exit code 3 if a file named on the command line would be refused.")]
     List(List),
+    /// Confirm the counter of a key whose sealing is locked, as after a restore
+    #[command(after_help = "\
+Examples:
+  gs-server key confirm --config station.toml
+  gs-server key confirm --config station.toml 374708ff
+
+Asked of the running server. Find out first why it is locked (`gs-server doctor` and the page say so), and
+see that the clock is right: sealing goes on above the clock and above every counter that is known.
+Exit code 3 when the server refuses.")]
+    Confirm(Confirm),
 }
 
 /// `gs-server key new`.
@@ -61,6 +82,19 @@ pub struct List {
     json: bool,
 }
 
+/// `gs-server key confirm`.
+#[derive(Debug, Args)]
+pub struct Confirm {
+    #[command(flatten)]
+    of: Of,
+    /// The id of the key; not needed where the station has one key
+    #[arg(value_name = "KEY")]
+    key: Option<KeyId>,
+    /// One JSON object on standard output: how it stands with sealing
+    #[arg(long)]
+    json: bool,
+}
+
 #[derive(Serialize)]
 struct Row<'a> {
     key: Option<String>,
@@ -75,7 +109,59 @@ impl Key {
         match self {
             Self::New(new) => new.run(),
             Self::List(list) => list.run(),
+            Self::Confirm(confirm) => confirm.run(),
         }
+    }
+}
+
+impl Confirm {
+    fn run(self) -> Result<Exit, Failure> {
+        let remote = server(&self.of.load()?)?;
+        let (key, sealing) =
+            runtime()?.block_on(confirm(&remote, self.key)).map_err(failure)?.map_err(Failure::usage)?;
+        if let Some(why) = sealing.as_ref().and_then(|sealing| sealing.locked.as_ref()) {
+            return Err(Failure::refused(format!("key {key} is confirmed, and still locked: {why}")));
+        }
+        match self.json {
+            true => print_json(&sealing)?,
+            false => print_line(format_args!("key {key} is confirmed: it may seal"))?,
+        }
+        Ok(Exit::Done)
+    }
+}
+
+/// Confirms a key, and waits a little until it is unlocked: first the archive, then the witness is written.
+async fn confirm(
+    remote: &Remote,
+    key: Option<KeyId>,
+) -> Result<Result<(String, Option<SealingView>), String>, RemoteError> {
+    let key = match key {
+        Some(key) => key.to_string(),
+        None => match only(remote.get("station", &[]).await?) {
+            Ok(key) => key,
+            Err(why) => return Ok(Err(why)),
+        },
+    };
+    remote.write(&format!("keys/{key}/confirm-counter"), &Nothing {}).await?;
+    let mut looks = 0;
+    loop {
+        let station: StationView = remote.get("station", &[]).await?;
+        let sealing = station.sealing.into_iter().find(|sealing| sealing.key == key);
+        looks += 1;
+        if looks == LOOKS || sealing.as_ref().is_none_or(|sealing| sealing.locked.is_none()) {
+            return Ok(Ok((key, sealing)));
+        }
+        wall_sleep(BETWEEN_LOOKS).await;
+    }
+}
+
+/// The station's key, where it has one.
+fn only(station: StationView) -> Result<String, String> {
+    let keys: Vec<String> = station.sealing.into_iter().map(|sealing| sealing.key).collect();
+    match &keys[..] {
+        [key] => Ok(key.clone()),
+        [] => Err("the station has no key".to_owned()),
+        several => Err(format!("name one of the station's keys: {}", several.join(", "))),
     }
 }
 

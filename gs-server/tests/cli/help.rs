@@ -88,6 +88,7 @@ fn every_verb_tells_what_it_does() {
             "gs-server-key",
             "gs-server-key-new",
             "gs-server-key-list",
+            "gs-server-key-confirm",
             "gs-server-audit",
             "gs-server-audit-list",
             "gs-server-audit-verify",

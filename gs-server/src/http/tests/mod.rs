@@ -3,6 +3,7 @@
 mod alerts;
 mod client;
 mod elements;
+mod hostile;
 mod lists;
 mod openapi;
 mod operations;
@@ -13,6 +14,7 @@ mod reads;
 mod rehearsals;
 mod reports;
 mod security;
+mod silent;
 mod sky;
 mod stream;
 mod two_persons;

@@ -179,7 +179,8 @@ fn witness(config: &Config, inspection: &Inspection) -> Vec<Finding> {
     let each = keys.map(|(satellite, key)| {
         let check = format!("counter of {}", satellite.name);
         let database = inspection.counters.get(&key.to_string()).copied();
-        let told = |counter: Option<Counter>| counter.map_or("none".to_owned(), |counter| counter.0.to_string());
+        let told =
+            |counter: Option<Counter>| counter.map_or("none".to_owned(), |counter| counter.0.to_string());
         match (database, folder.read(key)) {
             (None, Witness::Missing) => Finding::ok(check, "none was used yet"),
             (Some(database), Witness::At(at)) if at <= database => {
@@ -187,19 +188,27 @@ fn witness(config: &Config, inspection: &Inspection) -> Vec<Finding> {
             }
             (database, Witness::At(at)) => Finding::warning(
                 check,
-                format!("the witness stands at {}, the database at {}: it went back. Nothing is sealed", at.0, told(database)),
+                format!(
+                    "the witness stands at {}, the database at {}: it went back. Nothing is sealed",
+                    at.0,
+                    told(database)
+                ),
                 confirm,
             ),
-            (_, Witness::Missing) => {
-                Finding::warning(check, "counters were used, and the witness is gone. Nothing is sealed", confirm)
-            }
-            (_, Witness::Damaged(why)) => {
-                Finding::warning(check, format!("the witness cannot be read ({why}). Nothing is sealed"), confirm)
-            }
+            (_, Witness::Missing) => Finding::warning(
+                check,
+                "counters were used, and the witness is gone. Nothing is sealed",
+                confirm,
+            ),
+            (_, Witness::Damaged(why)) => Finding::warning(
+                check,
+                format!("the witness cannot be read ({why}). Nothing is sealed"),
+                confirm,
+            ),
             (_, Witness::Restored(_)) => Finding::warning(
                 check,
                 "the folder was restored from a backup. Nothing is sealed",
-                "See that the clock is right, then confirm the counter: POST /api/v1/keys/ID/confirm-counter.",
+                "See that the clock is right, then confirm the counter: `gs-server key confirm`.",
             ),
         }
     });
