@@ -16,6 +16,7 @@ pub mod alert;
 pub mod clock;
 pub mod config;
 mod cover;
+pub mod downlink;
 pub mod id;
 pub mod intent;
 pub mod level;

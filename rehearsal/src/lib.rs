@@ -22,6 +22,7 @@
 
 mod checks;
 mod config;
+pub mod downlink;
 pub mod fleet;
 mod operator;
 mod parts;
