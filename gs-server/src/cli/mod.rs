@@ -11,8 +11,10 @@ mod config;
 mod decode;
 mod demo;
 mod doctor;
+mod downlink;
 mod elements;
 mod failure;
+mod fit;
 mod hold;
 mod key;
 mod look;
@@ -103,6 +105,11 @@ pub enum Command {
     Plan(plan::Plan),
     /// Send a plan through its coming pass many times in simulation, and tell what to expect
     Rehearse(rehearse::Rehearse),
+    /// When the satellite should send its picture to stations of the public network
+    #[command(subcommand)]
+    Downlink(downlink::Downlink),
+    /// How late a satellite is against its elements, from the frequencies at which stations heard it
+    Fit(fit::Fit),
     /// Which plan gets which pass of the coming two days, and why
     Schedule(schedule::Schedule),
     /// What became of plans in passes, or the report of one
@@ -188,6 +195,8 @@ impl Cli {
             Command::Key(key) => key.run(),
             Command::Plan(plan) => plan.run(),
             Command::Rehearse(rehearse) => rehearse.run(),
+            Command::Downlink(downlink) => downlink.run(),
+            Command::Fit(fit) => fit.run(),
             Command::Schedule(schedule) => schedule.run(),
             Command::Runs(runs) => runs.run(),
             Command::Audit(audit) => audit.run(),

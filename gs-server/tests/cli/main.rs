@@ -7,6 +7,7 @@
 )]
 
 mod alerts;
+mod downlink;
 mod files;
 mod help;
 mod packaging;
