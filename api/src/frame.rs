@@ -4,7 +4,7 @@ use protocol::{Downlink, FieldValue};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::Time;
+use crate::{OutsideView, Time};
 
 /// Numbers above this are written as text: a JavaScript reader would round them.
 const SAFE_INTEGER: u64 = (1 << 53) - 1;
@@ -43,8 +43,11 @@ pub struct FrameView {
     /// Why it does not decode; only when one frame is asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub undecoded: Option<String>,
-    /// Who heard it.
+    /// Who heard it, of our stations.
     pub receptions: Vec<ReceptionView>,
+    /// Who heard it besides: TinyGS, SatNOGS, files.
+    #[serde(default)]
+    pub heard_elsewhere: Vec<OutsideView>,
 }
 
 /// One station heard one frame.

@@ -45,6 +45,7 @@ mod page;
 mod people;
 mod plan;
 mod problem;
+mod reception;
 mod rehearsal;
 mod report;
 mod run;
@@ -78,6 +79,7 @@ pub use plan::{
     PlanText, StepText,
 };
 pub use problem::{FieldError, Problem, ProblemKind};
+pub use reception::{EarView, ImportItem, ImportReport, ImportRequest, OutsideView};
 pub use rehearsal::{
     Percentiles, RehearsalAnswer, RehearsalRequest, RehearsalView, RehearsedEnd, RehearsedFigures,
     RehearsedPass, RehearsedRun, RehearsedStep,

@@ -10,19 +10,21 @@ mod down;
 mod elements;
 mod radio_driver;
 mod radio_reply;
+mod reception;
 mod up;
 
 pub use down::{down_frame, down_stream, downlink_payload};
 pub use elements::elements;
 pub use radio_driver::radio_driver;
 pub use radio_reply::radio_reply;
+pub use reception::reception;
 pub use up::{sealed_open, telecommand_payload, up_stream};
 
 /// A body: takes any bytes, panics when an invariant is broken.
 pub type Body = fn(&[u8]);
 
 /// Every body by the name of its corpus folder and fuzz target.
-pub const BODIES: [(&str, Body); 9] = [
+pub const BODIES: [(&str, Body); 10] = [
     ("down_stream", down_stream),
     ("down_frame", down_frame),
     ("downlink_payload", downlink_payload),
@@ -32,6 +34,7 @@ pub const BODIES: [(&str, Body); 9] = [
     ("radio_reply", radio_reply),
     ("radio_driver", radio_driver),
     ("elements", elements),
+    ("reception", reception),
 ];
 
 /// Feeds a stream in pieces whose lengths a few input bytes choose.

@@ -9,6 +9,7 @@
 //! | [`hamlib`] | rotator and rig behind hamlib's daemons: clients, and the tasks that follow a satellite |
 //! | [`storage`], [`witness`] | the archive, the reserve, and the counters' witness beside them |
 //! | [`alerts`] | what is wrong, who knows of it and who is told: e-mail, webhooks, chats |
+//! | [`ingest`] | what strangers' stations heard: formats, and the way into the archive |
 //! | [`hub`] | committed events on their way to watchers |
 //! | [`http`] | API v1, the stream, the first page |
 //! | [`clock`] | the machine's clock and simulated ones; the only place that reads time or sets a timer |
@@ -41,6 +42,7 @@ pub mod engine;
 pub mod hamlib;
 pub mod http;
 pub mod hub;
+pub mod ingest;
 pub mod keys;
 mod leases;
 pub mod lifecycle;

@@ -35,6 +35,7 @@ use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, Os
 use crate::hamlib::{self, AntennaTask};
 use crate::http::{self, AllowedHosts, HttpState, Identity, RadioOnAir, Tls, TlsFiles, Token};
 use crate::hub::Hub;
+use crate::ingest::{Aliases, Ears};
 use crate::keys;
 use crate::leases::Leases;
 use crate::lifecycle::Lifecycle;
@@ -289,7 +290,11 @@ pub async fn run_with(
     })?;
     alerts_task.spawn(&api);
     reports(&config, &identity, &store, &timer, &hub, &api);
+    let ears = Ears::new(store.clone(), inbox.clone(), Arc::clone(&timer));
+    let aliases = Aliases::of(&config);
     let state = HttpState {
+        ears,
+        aliases,
         elements,
         alerts,
         store: store.clone(),

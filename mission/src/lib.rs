@@ -24,6 +24,7 @@ pub mod limits;
 pub mod plan;
 pub mod pointing;
 pub mod port;
+pub mod reception;
 pub mod record;
 pub mod run;
 pub mod schedule;

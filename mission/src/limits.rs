@@ -61,6 +61,11 @@ impl LimitState {
         self.level
     }
 
+    /// Whether this value is worse than the level in force.
+    pub fn is_worse(&self, value: f64) -> bool {
+        self.rule.level_of(value, self.level).is_some_and(|level| level > self.level)
+    }
+
     /// Takes the next sample; the new level when it changes. An invalid value changes nothing.
     pub fn sample(&mut self, value: f64) -> Option<Level> {
         let level = self.rule.level_of(value, self.level)?;

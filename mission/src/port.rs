@@ -8,6 +8,7 @@ use crate::clock::{MonoUs, Now, UtcUs};
 use crate::id::{BatchId, CommandId, FrameId, IntentId, LinkId, SatelliteId, TxId};
 use crate::intent::{Accepted, IntentEnvelope, Refusal};
 use crate::level::Level;
+use crate::reception::{Delivered, NotTaken, Taken};
 use crate::record::{Batch, EventKind, Route, Source};
 
 /// What the world tells the engine.
@@ -33,6 +34,13 @@ pub enum Input<'a> {
         id: FrameId,
         /// The frame.
         frame: &'a ReservedFrame,
+    },
+    /// What ears other than our radio report; answered by [`Effect::Taken`].
+    Outside {
+        /// A number of the shell's own.
+        delivery: u64,
+        /// The reports. Those that the archive has already are left out.
+        receptions: &'a [Delivered],
     },
     /// A link came up, went down, or learnt something.
     Link {
@@ -217,6 +225,13 @@ pub enum Effect {
         intent: IntentId,
         /// What became of it.
         result: Result<Accepted, Refusal>,
+    },
+    /// Tell whoever delivered what became of it. What it tells is durable.
+    Taken {
+        /// Which delivery.
+        delivery: u64,
+        /// What became of it.
+        result: Result<Taken, NotTaken>,
     },
     /// Storage fails: keep this raw frame in the preallocated reserve.
     Reserve(ReservedFrame),

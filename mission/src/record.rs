@@ -15,6 +15,7 @@ use crate::id::{
 use crate::intent::IntentReceipt;
 use crate::level::Level;
 use crate::plan::Condition;
+use crate::reception::Reception;
 use crate::run::{PlanRecord, RunRecord};
 use crate::stage::Stage;
 
@@ -50,6 +51,8 @@ pub enum Record {
     Frame(FrameRecord),
     /// Somebody heard a frame.
     Reception(ReceptionRecord),
+    /// Somebody else heard something; again, it changes nothing.
+    Outside(Box<OutsideRecord>),
     /// The level of a reception, which arrives after the frame.
     ReceptionRssi(ReceptionRssi),
     /// Values derived from a frame.
@@ -120,6 +123,21 @@ pub struct ReceptionRecord {
     pub received_at: UtcUs,
     /// Received power in dBm, when known already.
     pub rssi_dbm: Option<i16>,
+}
+
+/// What an ear other than our radio reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutsideRecord {
+    /// Whose frame it is.
+    pub satellite: SatelliteId,
+    /// The station that took the report in.
+    pub station: StationId,
+    /// The frame; `None` for a detection and for bytes that are none.
+    pub frame: Option<FrameId>,
+    /// What was reported.
+    pub reception: Arc<Reception>,
+    /// When it was taken in.
+    pub taken_at: UtcUs,
 }
 
 /// How a reception came in.

@@ -25,6 +25,25 @@ pub struct Snapshot {
     /// By id: the runs that are not over, of each plan the newest that ended to be finished later, and of each satellite
     /// the newest that ended.
     pub runs: Vec<RunRecord>,
+    /// The newest frames: the same bytes a moment later are the same frame.
+    pub recent: Vec<RecentFrame>,
+}
+
+/// A frame that was heard shortly before the restart.
+#[derive(Debug, Clone)]
+pub struct RecentFrame {
+    /// Which.
+    pub id: FrameId,
+    /// Whose.
+    pub satellite: SatelliteId,
+    /// When it was heard.
+    pub at: UtcUs,
+    /// Its bytes.
+    pub bytes: Box<[u8]>,
+    /// No station of ours had heard it.
+    pub elsewhere: bool,
+    /// Its time is known.
+    pub dated: bool,
 }
 
 /// The highest ids in use; 0 when there are none.

@@ -13,6 +13,8 @@
 //! | `sky` | elements and passes: whether the satellite is in view |
 //! | `link`, `satellite` | what is known of each |
 //! | `intake` | bytes to frames, frames to records |
+//! | `outside` | what others heard |
+//! | `recent` | frames of a moment ago: the same bytes again are no second frame |
 //! | `packets` | what a packet changes |
 //! | `gate` | whether the uplink may be used now, and if not, when |
 //! | `wanted` | whether a command that waits may still go on |
@@ -37,8 +39,10 @@ mod intents;
 mod journal;
 mod link;
 mod outcome;
+mod outside;
 mod packets;
 mod plans;
+mod recent;
 mod restore;
 mod runner;
 mod satellite;
@@ -55,7 +59,7 @@ use protocol::KeyId;
 
 use crate::clock::{MonoUs, Now, UtcUs};
 use crate::config::{StationConfig, Times};
-use crate::id::{AntennaId, FrameId, LinkId, Principal, SatelliteId, StationId};
+use crate::id::{AntennaId, LinkId, Principal, SatelliteId, StationId};
 use crate::level::Level;
 use crate::port::{Effect, Input, LinkState};
 use crate::record::{AuditRecord, EventKind, EventRecord, Record, Route, Subject};
@@ -67,6 +71,7 @@ use crate::status::Status;
 use agenda::Agenda;
 use journal::Journal;
 use link::Link;
+use recent::Recents;
 use runner::{LastEnd, Run};
 use satellite::Satellite;
 
@@ -74,15 +79,6 @@ use satellite::Satellite;
 pub trait Entropy: Send {
     /// Fills the buffer.
     fn fill(&mut self, bytes: &mut [u8]);
-}
-
-/// A frame that was heard a moment ago, so that the same bytes again are a second reception and not a second frame.
-struct Recent {
-    id: FrameId,
-    /// Index of the satellite: equal bytes of two satellites are two frames.
-    satellite: usize,
-    at: UtcUs,
-    bytes: Box<[u8]>,
 }
 
 /// The station: a plain state machine.
@@ -109,7 +105,7 @@ pub struct Station {
     last_ends: Vec<LastEnd>,
     ids: LastIds,
     last_tx: u64,
-    recent: VecDeque<Recent>,
+    recent: Recents,
     synchronised: bool,
     vouched: bool,
     stopping: bool,
@@ -128,6 +124,7 @@ impl Station {
             Input::Bytes { link, bytes, source, received } => self.take_bytes(link, bytes, source, received),
             Input::Recovered(frame) => self.take_recovered(frame),
             Input::Elsewhere { id, frame } => self.take_elsewhere(now, id, frame),
+            Input::Outside { delivery, receptions } => self.take_outside(now, delivery, receptions),
             Input::Link { link, state } => self.link_state(now, link, state),
             Input::TxStarted(tx) => self.tx_started(tx),
             Input::TxDone { tx, airtime_us, .. } => self.tx_done(now, tx, airtime_us),

@@ -204,7 +204,11 @@ impl Ground {
                 Effect::Witness { key, counter } => {
                     self.station.handle(now, Input::WitnessDone { key, counter });
                 }
-                Effect::Transmit(_) | Effect::Reply { .. } | Effect::Reserve(_) | Effect::ReserveClear => {}
+                Effect::Transmit(_)
+                | Effect::Reply { .. }
+                | Effect::Taken { .. }
+                | Effect::Reserve(_)
+                | Effect::ReserveClear => {}
             }
         }
     }

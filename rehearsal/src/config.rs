@@ -32,6 +32,8 @@ pub struct WorldConfig {
     pub operator: Operator,
     /// What goes wrong on the ground.
     pub chaos: Chaos,
+    /// Others who hear the satellite, wherever it is; `None`: nobody does.
+    pub strangers: Option<Strangers>,
     /// A station and a satellite that exist, with what they are told at the beginning; `None`: made up.
     pub known: Option<Box<Known>>,
 }
@@ -68,6 +70,15 @@ pub enum Operator {
     Busy,
 }
 
+/// Others who hear the satellite and report it later.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strangers {
+    /// The chance that anybody hears a frame.
+    pub hear: f64,
+    /// How long after the frame their report comes, seconds.
+    pub delay_s: f64,
+}
+
 /// What goes wrong on the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Chaos {
@@ -97,6 +108,7 @@ impl WorldConfig {
             view_is_known: false,
             operator: Operator::WantsImage,
             chaos: Chaos::default(),
+            strangers: None,
             known: None,
         }
     }

@@ -29,9 +29,10 @@ mod parts;
 pub mod rehearse;
 mod report;
 mod store;
+mod strangers;
 mod world;
 
 pub use checks::{Invariant, Violation};
-pub use config::{Chaos, Known, Operator, WorldConfig};
+pub use config::{Chaos, Known, Operator, Strangers, WorldConfig};
 pub use report::Report;
 pub use world::World;

@@ -44,6 +44,8 @@ pub struct Report {
     pub collisions: u64,
     /// Times the engine was killed.
     pub kills: u64,
+    /// Frames that others reported.
+    pub reported: u64,
     /// Passes that were seen to their end.
     pub passes: u64,
     /// SHA-256 of everything that happened, as hex: equal for equal seeds.

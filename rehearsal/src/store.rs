@@ -174,6 +174,7 @@ impl Store {
                 self.bridges += u64::from(event.kind == mission::record::EventKind::Bridge);
             }
             Record::Reception(_)
+            | Record::Outside(_)
             | Record::ReceptionRssi(_)
             | Record::Telemetry(_)
             | Record::Audit(_)
@@ -212,6 +213,7 @@ impl Store {
                 elements: self.elements.clone(),
                 pass: self.passes.values().rev().find(|pass| pass.ended_at.is_none()).cloned(),
             }],
+            recent: Vec::new(),
             plans: self.plans.values().filter(|plan| plan.withdrawn_at.is_none()).cloned().collect(),
             runs: {
                 let ended = |run: &&RunRecord| run.state == RunState::Ended;

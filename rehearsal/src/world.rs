@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use mission::reception::Delivered;
 use mission::{
     Accepted, Batch, BatchId, CounterRule, Effect, Entropy, Input, Intent, IntentEnvelope, IntentId,
     LinkConfig, LinkId, LinkState, MaybeRadiated, MonoUs, Now, Principal, Profile, SatelliteConfig,
@@ -21,6 +22,7 @@ use crate::operator::Desk;
 use crate::parts::{device, driver_config, named, named_link, station_name};
 use crate::report::Report;
 use crate::store::Store;
+use crate::strangers::Reports;
 
 /// Seeded bytes for the engine.
 struct Seeded(ChaCha8Rng);
@@ -69,6 +71,7 @@ pub struct World {
     our_air_us: (u64, u64),
     their_air_us: (u64, u64),
     refusals: Vec<String>,
+    reports: Reports,
 }
 
 impl World {
@@ -86,6 +89,7 @@ impl World {
         let desk =
             Desk::new(config.operator, ChaCha8Rng::from_rng(&mut rng), satellite.clone(), link.clone());
         let report = Report { seed: config.seed, ..Report::default() };
+        let reports = Reports::new(config.strangers, config.seed);
         Self {
             in_view: device.in_view(0),
             driver: Driver::new(driver_config()),
@@ -117,6 +121,7 @@ impl World {
             our_air_us: (0, 0),
             their_air_us: (0, 0),
             refusals: Vec::new(),
+            reports,
         }
     }
 
@@ -213,6 +218,7 @@ impl World {
             self.restart_at,
             self.kill_at,
             self.station.as_ref().and(self.unplug_at),
+            self.station.as_ref().and(self.reports.next_us()),
         ];
         let next = next.into_iter().flatten().min().unwrap_or(self.now_us + 1_000_000);
         self.idle_steps = if next > self.now_us { 0 } else { self.idle_steps + 1 };
@@ -287,6 +293,7 @@ impl World {
             JournalEntry::SatelliteSent { at_us, end_us, frame } => {
                 self.note(frame);
                 self.their_air_us = (*at_us, *end_us);
+                self.reports.sent(*end_us, frame);
                 let heard = self.in_view && overlap(self.our_air_us, self.their_air_us);
                 self.report.collisions += u64::from(heard);
             }
@@ -370,6 +377,7 @@ impl World {
         if is_due(&mut self.drained_at) {
             self.driver.handle(now_us, DriverInput::Drained);
         }
+        self.strangers_step();
         if self.driver.next_wakeup_us().is_some_and(|at| at <= now_us) {
             self.driver.handle(now_us, DriverInput::Wake);
         }
@@ -385,6 +393,22 @@ impl World {
             }
         }
         Ok(())
+    }
+
+    /// What others report by now.
+    fn strangers_step(&mut self) {
+        let due = self.reports.due(self.now_us);
+        if due.is_empty() {
+            return;
+        }
+        let at_us = |us: u64| UtcUs(self.utc_at_zero_us + i64::try_from(us).unwrap_or(i64::MAX));
+        let now = self.now().utc;
+        let delivered: Vec<Delivered> = due
+            .iter()
+            .filter_map(|heard| heard.delivered(&self.satellite, at_us(heard.end_us), now))
+            .collect();
+        self.report.reported += delivered.len() as u64;
+        self.tell(Input::Outside { delivery: self.now_us, receptions: &delivered });
     }
 
     /// A new life of the engine, from what the store holds.
@@ -602,7 +626,10 @@ impl World {
             Effect::Reply { result: Err(refusal), .. } if self.config.known.is_some() => {
                 self.refusals.push(refusal.to_string());
             }
-            Effect::Reply { result: Err(_), .. } | Effect::Reserve(_) | Effect::ReserveClear => {}
+            Effect::Reply { result: Err(_), .. }
+            | Effect::Taken { .. }
+            | Effect::Reserve(_)
+            | Effect::ReserveClear => {}
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ mod elements;
 mod failure;
 mod fit;
 mod hold;
+mod import;
 mod key;
 mod look;
 mod openapi;
@@ -154,6 +155,8 @@ pub enum Command {
     Approve(approve::Approve),
     /// Say no to it, or take back what one asked for oneself
     Refuse(approve::Refuse),
+    /// Bring in what others heard: files of TinyGS, SatNOGS, KISS, hex
+    Import(import::Import),
     /// Derive every value again from the raw frames
     Redecode(redecode::Redecode),
 }
@@ -211,6 +214,7 @@ impl Cli {
             Command::Approve(approve) => approve.run(),
             Command::Refuse(refuse) => refuse.run(),
             Command::Report(report) => report.run(),
+            Command::Import(import) => import.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

@@ -31,6 +31,12 @@ impl Config {
     /// [`ConfigError::Value`] with the key, what was found and what to do: the first one that is wrong.
     pub fn check(&self) -> Result<(), ConfigError> {
         name("station.name".into(), StationId::new(&self.station.name).map(drop))?;
+        ensure(
+            self.station.name != mission::reception::ELSEWHERE,
+            "station.name",
+            "'elsewhere' stands for what only others heard",
+            "Choose another name.",
+        )?;
         self.station.site()?;
         self.station.times()?;
         ensure(!self.satellites.is_empty(), "satellites", "there is none", "Add a [[satellites]] section.")?;
@@ -200,6 +206,12 @@ impl SatelliteSection {
             format!("{key}.heartbeat_period_s"),
             format!("{}", self.heartbeat_period_s),
             "Give 1 to 86400 seconds.",
+        )?;
+        ensure(
+            self.launched_at.is_none() || self.launched_at().is_some(),
+            format!("{key}.launched_at"),
+            format!("'{}' is no time", self.launched_at.as_deref().unwrap_or_default()),
+            "Write e.g. 2027-03-01T04:00:00Z.",
         )?;
         let mut parameters = BTreeSet::new();
         for (at, limit) in self.limits.iter().enumerate() {

@@ -36,9 +36,24 @@ pub struct SatelliteSection {
     /// Its name as element sets have it (OBJECT_NAME), for sets without a number or before there is one.
     #[serde(default)]
     pub object_name: Option<String>,
+    /// What it is called elsewhere, e.g. `PixelSat-I` at TinyGS: a packet of which a receiver kept no bytes is taken for
+    /// its own under one of these, its name or its numbers.
+    #[serde(default)]
+    pub aliases: Vec<String>,
+    /// When it was launched, e.g. `2027-03-01T04:00:00Z`: nobody heard it before.
+    #[serde(default)]
+    pub launched_at: Option<String>,
     /// Limits on its values.
     #[serde(default)]
     pub limits: Vec<LimitSection>,
+}
+
+impl SatelliteSection {
+    /// When it was launched; `None` when nobody said, or said it so that it is no time.
+    pub fn launched_at(&self) -> Option<mission::UtcUs> {
+        let at: jiff::Timestamp = self.launched_at.as_deref()?.parse().ok()?;
+        Some(mission::UtcUs(at.as_microsecond()))
+    }
 }
 
 const fn default_address() -> u16 {

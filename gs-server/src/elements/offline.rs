@@ -10,7 +10,7 @@ use tokio_util::sync::CancellationToken;
 use super::door::Door;
 use crate::clock::Timer;
 use crate::config::{Config, station_config};
-use crate::engine::{Engine, EngineParts, OsEntropy};
+use crate::engine::{Engine, EngineInbox, EngineParts, OsEntropy};
 use crate::hub::Hub;
 use crate::lifecycle::Lifecycle;
 use crate::run::{self, RunError};
@@ -23,6 +23,8 @@ const END: Duration = Duration::from_secs(5);
 pub struct Offline {
     /// The way in.
     pub door: Door,
+    /// The engine's inbox, for what others heard.
+    pub inbox: EngineInbox,
     /// The clock.
     pub timer: Arc<dyn Timer>,
     life: Lifecycle,
@@ -42,7 +44,7 @@ impl Offline {
         let snapshot = run::snapshot(&store, &station).await?;
         let recovered = run::not_yet_stored(&store, store.reserve_read().await?).await?;
         let entropy = OsEntropy::new().map_err(|source| RunError::Io { what: "no randomness", source })?;
-        let (engine, _inbox, handle) = Engine::new(EngineParts {
+        let (engine, inbox, handle) = Engine::new(EngineParts {
             station,
             snapshot,
             recovered,
@@ -58,7 +60,7 @@ impl Offline {
         let life = Lifecycle::new(&CancellationToken::new());
         let stop = life.soft.clone();
         life.spawn("engine", async move { engine.run(stop.clone(), stop).await.map_err(Into::into) });
-        Ok(Self { door: Door { engine: handle, store }, timer, life })
+        Ok(Self { door: Door { engine: handle, store }, inbox, timer, life })
     }
 
     /// Ends it in order.

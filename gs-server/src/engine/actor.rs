@@ -1,13 +1,15 @@
 //! The loop around the station.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use mission::port::ReservedFrame;
+use mission::reception::{NotTaken, Taken};
 use mission::{
     Effect, Entropy, FrameId, Input, Lease, MaybeRadiated, MonoUs, Now, Snapshot, Station, StationConfig,
     TxId,
 };
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 
 use super::background::{Background, Outcome, ReserveWork};
@@ -80,6 +82,14 @@ pub(crate) struct Engine {
     background: Background,
     retry: Retry,
     replaced: bool,
+    deliveries: Deliveries,
+}
+
+/// Who waits for the answer to a delivery; as many as the inbox holds and the archive is busy with.
+#[derive(Default)]
+struct Deliveries {
+    last: u64,
+    answers: HashMap<u64, oneshot::Sender<Result<Taken, NotTaken>>>,
 }
 
 impl Engine {
@@ -126,6 +136,7 @@ impl Engine {
             background: Background::default(),
             retry: Retry::default(),
             replaced: false,
+            deliveries: Deliveries::default(),
             timer: Arc::clone(&timer),
         };
         let inbox = EngineInbox { sender, timer: Arc::clone(&timer) };
@@ -219,6 +230,12 @@ impl Engine {
                 self.handle(Input::Bytes { link: &link, bytes: &bytes, source, received });
             }
             EngineMessage::Elsewhere { id, frame } => self.handle(Input::Elsewhere { id, frame: &frame }),
+            EngineMessage::Outside { receptions, answer } => {
+                self.deliveries.last += 1;
+                let delivery = self.deliveries.last;
+                self.deliveries.answers.insert(delivery, answer);
+                self.handle(Input::Outside { delivery, receptions: &receptions });
+            }
             EngineMessage::Link { link, state } => self.handle(Input::Link { link: &link, state }),
             EngineMessage::TxStarted(tx) => self.handle(Input::TxStarted(tx)),
             EngineMessage::TxDone { tx, airtime_us, measured } => {
@@ -336,6 +353,12 @@ impl Engine {
                     }
                 }
                 Effect::Reply { intent, result } => self.intents.reply(intent, result),
+                Effect::Taken { delivery, result } => {
+                    if let Some(answer) = self.deliveries.answers.remove(&delivery) {
+                        // Whoever delivered may have gone away; what was taken is durable all the same.
+                        let _ = answer.send(result);
+                    }
+                }
                 Effect::Reserve(frame) => {
                     if !self.background.queue_reserve(ReserveWork::Push(Box::new(frame))) {
                         self.handle(Input::ReserveFailed { reason: "the disk is too slow" });

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use mission::port::ReservedFrame;
+use mission::reception::{Delivered, NotTaken, Taken};
 use mission::record::EventKind;
 use mission::{
     FrameId, Lease, Level, LinkId, LinkState, MaybeRadiated, Now, SatelliteId, Source, Transmit, TxId, UtcUs,
 };
 use protocol::KeyId;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 
 use crate::clock::{BusyToken, Timer};
 
@@ -64,6 +65,13 @@ pub enum EngineMessage {
         radiated: MaybeRadiated,
         /// Why.
         reason: String,
+    },
+    /// What ears other than our radio report.
+    Outside {
+        /// The reports.
+        receptions: Vec<Delivered>,
+        /// Where the answer goes, once it is durable.
+        answer: oneshot::Sender<Result<Taken, NotTaken>>,
     },
     /// What an orbit or a stored profile says.
     View {

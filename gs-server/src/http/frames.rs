@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::App;
 use super::extract::{Id, Query, number, page, paged, scope, small, time};
 use super::problem::Failure;
+use super::receptions;
 use crate::storage::{FrameQuery, FrameRow, ReceptionRow};
 
 #[derive(Debug, Deserialize)]
@@ -35,7 +36,16 @@ pub(super) async fn list(
         page: page(asked.after, asked.before, asked.limit)?,
     };
     let heard = app.state.store.frames(&query).await?;
-    let views = heard.into_iter().map(|heard| view(&heard.frame, heard.receptions)).collect();
+    let ids: Vec<i64> = heard.iter().map(|heard| heard.frame.id).collect();
+    let mut elsewhere = app.state.store.outside_of(&ids).await?;
+    let views = heard.into_iter().map(|heard| {
+        let others = elsewhere.remove(&heard.frame.id).unwrap_or_default();
+        FrameView {
+            heard_elsewhere: others.into_iter().map(receptions::view).collect(),
+            ..view(&heard.frame, heard.receptions)
+        }
+    });
+    let views = views.collect();
     Ok(Json(paged(views, &query.page, |frame: &FrameView| frame.id)))
 }
 
@@ -43,6 +53,8 @@ pub(super) async fn get(State(app): State<App>, id: Id) -> Result<Json<FrameView
     let heard = app.state.store.frame(id.row()).await?;
     let heard = heard.ok_or_else(|| Failure::no_such("frame", id.0))?;
     let mut frame = view(&heard.frame, heard.receptions);
+    let others = app.state.store.outside_of(&[heard.frame.id]).await?.remove(&heard.frame.id);
+    frame.heard_elsewhere = others.unwrap_or_default().into_iter().map(receptions::view).collect();
     match decode(&heard.frame.bytes) {
         Ok(packet) => frame.packet = Some(packet),
         Err(why) => frame.undecoded = Some(why),
@@ -74,6 +86,7 @@ pub(super) fn view(row: &FrameRow, receptions: Vec<ReceptionRow>) -> FrameView {
         packet: None,
         undecoded: None,
         receptions: receptions.into_iter().map(reception).collect(),
+        heard_elsewhere: Vec::new(),
     }
 }
 

@@ -33,6 +33,7 @@ mod page;
 mod people;
 mod plans;
 mod problem;
+mod receptions;
 mod rehearsals;
 mod release;
 mod reports;
@@ -72,6 +73,7 @@ use crate::elements::ElementsHandle;
 use crate::engine::EngineHandle;
 use crate::hamlib::AntennaHandle;
 use crate::hub::Hub;
+use crate::ingest::{Aliases, Ears};
 use crate::people::People;
 use crate::storage::Store;
 
@@ -94,6 +96,10 @@ pub struct HttpState {
     pub elements: ElementsHandle,
     /// What is wrong, and who is told.
     pub alerts: AlertsHandle,
+    /// The way of reports into the archive.
+    pub ears: Ears,
+    /// What our satellites are called elsewhere.
+    pub aliases: Aliases,
     /// Committed events as they come.
     pub hub: Hub,
     /// Rotator and rig, as far as there are any.

@@ -21,6 +21,7 @@ mod convert;
 mod convert_plan;
 mod convert_sky;
 mod db;
+mod ears;
 mod error;
 mod inspect;
 mod lite;
@@ -56,6 +57,7 @@ pub use alerts::{
 };
 pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
 pub use backup::{DatabaseFacts, copy_database, examine_database};
+pub use ears::{OutsideQuery, OutsideRow};
 pub use error::StoreError;
 pub(crate) use error::utc;
 pub use inspect::{Inspection, inspect_database};

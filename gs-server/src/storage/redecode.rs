@@ -14,7 +14,8 @@ use super::rows::{
     ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 use super::write::Transaction;
-use super::{AlertRow, DeliveryRow, Store, StoreError};
+use super::{AlertRow, DeliveryRow, OutsideRow, Store, StoreError};
+use mission::reception::{ELSEWHERE, UNDATED};
 
 /// Frames in one transaction: some thousand rows, some ten milliseconds.
 const FRAMES_PER_STEP: i64 = 200;
@@ -133,7 +134,10 @@ async fn remake(
     if parsed.is_err() {
         report.found(&StoreError::damaged(format!("frame {} is no frame: its checksum is wrong", frame.id)));
     }
-    let packet = parsed.ok().filter(|_| !frame.nested).and_then(|parsed| parsed.packet().ok());
+    let at_us = time_of(transaction, frame).await?;
+    let counts = !frame.nested && at_us.is_some();
+    let at_us = at_us.unwrap_or(frame.heard_at_us);
+    let packet = parsed.ok().filter(|_| counts).and_then(|parsed| parsed.packet().ok());
     report.without_packet += u64::from(packet.is_none());
 
     let mut wanted = BTreeMap::new();
@@ -145,7 +149,7 @@ async fn remake(
         let parameter = transaction.parameter(&frame.satellite, &point.parameter, point.unit).await?;
         let row = TelemetryRow {
             parameter,
-            at_us: frame.heard_at_us,
+            at_us,
             frame: frame.id,
             route,
             value: point.value,
@@ -158,7 +162,7 @@ async fn remake(
         "where parameter in (select id from parameters where satellite = ?) and at_us = ? and frame = ?",
     ))
     .bind(&frame.satellite)
-    .bind(frame.heard_at_us)
+    .bind(at_us)
     .bind(frame.id)
     .fetch_all(&mut *transaction.connection)
     .await?;
@@ -183,7 +187,7 @@ async fn remake(
                 report.removed += 1;
                 sql("delete from telemetry where parameter = ? and at_us = ? and frame = ?")
                     .bind(parameter)
-                    .bind(frame.heard_at_us)
+                    .bind(at_us)
                     .bind(frame.id)
                     .execute(&mut *transaction.connection)
                     .await?;
@@ -196,10 +200,19 @@ async fn remake(
     transaction.insert_telemetry(&rows).await
 }
 
+/// When the values of a frame were heard. A frame that came without a time has values once somebody reports it with one.
+async fn time_of(transaction: &mut Transaction<'_>, frame: &FrameRow) -> Result<Option<i64>, StoreError> {
+    if frame.station != ELSEWHERE || frame.link != UNDATED {
+        return Ok(Some(frame.heard_at_us));
+    }
+    super::ears::told_us(frame.id, &mut *transaction.connection).await
+}
+
 /// Values that belong to no frame, or to another time than their frame.
 async fn finish(transaction: &mut Transaction<'_>, report: &mut RedecodeReport) -> Result<(), StoreError> {
     let orphans = sql("delete from telemetry where not exists (
-           select 1 from frames where frames.id = telemetry.frame and frames.heard_at_us = telemetry.at_us)")
+           select 1 from frames where frames.id = telemetry.frame
+             and (frames.heard_at_us = telemetry.at_us or frames.link = 'undated'))")
     .execute(&mut *transaction.connection)
     .await?;
     report.removed += orphans;
@@ -210,6 +223,7 @@ async fn finish(transaction: &mut Transaction<'_>, report: &mut RedecodeReport) 
 /// Reads every row of the tables that cannot be made again.
 async fn verify_the_rest(store: &Store, report: &mut RedecodeReport) -> Result<(), StoreError> {
     verify::<ReceptionRow>(store, report).await?;
+    verify::<OutsideRow>(store, report).await?;
     verify::<ParameterRow>(store, report).await?;
     verify::<RouteRow>(store, report).await?;
     verify::<CommandRow>(store, report).await?;

@@ -45,6 +45,7 @@ pub(super) async fn snapshot(
             snapshot.satellites.push(left);
         }
     }
+    snapshot.recent = super::ears::recent(connection, satellites).await?;
     snapshot.plans = plans(connection, own).await?;
     snapshot.runs = runs(connection, own).await?;
     let folder = store.0.witness.clone();
@@ -370,7 +371,8 @@ async fn heartbeat(
     own: Own,
 ) -> Result<Option<(FrameId, UtcUs, u32)>, StoreError> {
     let rows = sql(select::<FrameRow>(
-        "where satellite = ? and packet_type = ? and nested = 0 and id > ? and id < ? order by id desc limit ?",
+        "where satellite = ? and packet_type = ? and nested = 0 and id > ? and id < ? and station <> 'elsewhere'
+         order by id desc limit ?",
     ))
     .bind(satellite.as_str())
     .bind(i64::from(down_type::HEARTBEAT))

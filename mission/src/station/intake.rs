@@ -3,7 +3,8 @@
 use protocol::{DownFrame, DownItem, Downlink, RequestTag};
 
 use super::link::LastFrame;
-use super::{About, Recent, Station};
+use super::recent::Recent;
+use super::{About, Station};
 use crate::clock::{Now, UtcUs};
 use crate::id::{FrameId, LinkId};
 use crate::level::Level;
@@ -13,11 +14,6 @@ use crate::record::{
     TelemetryRecord,
 };
 use crate::telemetry;
-
-/// The same bytes within this time are one frame.
-const SAME_FRAME_US: i64 = 30_000_000;
-/// So many frames are remembered for that.
-const RECENT_FRAMES: usize = 256;
 
 /// A frame that has just been taken in.
 #[derive(Debug, Clone)]
@@ -33,8 +29,10 @@ pub(super) struct Heard {
     pub(super) from_radio: bool,
     /// Bytes of the frame, for how long it was on the air.
     pub(super) length: usize,
-    /// These bytes were heard a moment ago already.
+    /// These bytes were heard a moment ago already, by our radio.
     pub(super) repeat: bool,
+    /// Its values are in the archive: somebody else's report of it came first.
+    pub(super) has_values: bool,
 }
 
 /// How a frame came in.
@@ -205,6 +203,7 @@ impl Station {
             from_radio: kept.source == Source::Radio,
             length: frame.bytes().len(),
             repeat: false,
+            has_values: false,
         };
         self.packet(&heard, &packet);
     }
@@ -214,8 +213,15 @@ impl Station {
     fn archive(&mut self, l: usize, frame: &DownFrame<'_>, how: How, received: Now) -> Option<Heard> {
         let route = self.route(l);
         let satellite = self.links[l].satellite;
-        let known = self.known_frame(satellite, frame.bytes(), received.utc);
-        let id = known.unwrap_or_else(|| {
+        let known = self.recent.find(satellite, frame.bytes(), (received.utc, true)).map(|recent| {
+            let others_first = std::mem::take(&mut recent.elsewhere);
+            let has_values = std::mem::replace(&mut recent.dated, true);
+            if !has_values {
+                recent.at = received.utc;
+            }
+            (recent.id, others_first, has_values)
+        });
+        let id = known.map(|(id, ..)| id).unwrap_or_else(|| {
             self.ids.frame += 1;
             FrameId(self.ids.frame)
         });
@@ -228,7 +234,8 @@ impl Station {
             live: how.source == Source::Radio,
             from_radio: how.source == Source::Radio,
             length: frame.bytes().len(),
-            repeat: known.is_some() && !how.promoted,
+            repeat: known.is_some_and(|(_, others_first, _)| !others_first) && !how.promoted,
+            has_values: known.is_some_and(|(_, others_first, has_values)| others_first && has_values),
         };
         let (record, reception) = rows(id, route.clone(), frame, &how, received.utc);
         if how.promoted && known.is_some() {
@@ -238,10 +245,14 @@ impl Station {
         if known.is_some() {
             self.journal.push_reception(reception);
         } else if self.journal.push_frame(record, reception) {
-            self.recent.push_back(Recent { id, satellite, at: received.utc, bytes: frame.bytes().into() });
-            if self.recent.len() > RECENT_FRAMES {
-                self.recent.pop_front();
-            }
+            self.recent.remember(Recent {
+                id,
+                satellite,
+                at: received.utc,
+                bytes: frame.bytes().into(),
+                elsewhere: false,
+                dated: true,
+            });
         } else {
             return None;
         }
@@ -254,18 +265,6 @@ impl Station {
         );
         self.heard_event(&heard, EventKind::FrameHeard, Level::Normal, message);
         Some(heard)
-    }
-
-    fn known_frame(&mut self, satellite: usize, bytes: &[u8], at: UtcUs) -> Option<FrameId> {
-        while self.recent.front().is_some_and(|recent| at.0.saturating_sub(recent.at.0) > SAME_FRAME_US) {
-            self.recent.pop_front();
-        }
-        let same = |recent: &&Recent| {
-            recent.satellite == satellite
-                && *recent.bytes == *bytes
-                && at.0.abs_diff(recent.at.0) <= SAME_FRAME_US.unsigned_abs()
-        };
-        self.recent.iter().find(same).map(|recent| recent.id)
     }
 
     /// Values, then what the packet changes.
@@ -292,13 +291,15 @@ impl Station {
                 self.limits(heard, &points);
                 self.note_readings(heard, &points);
             }
-            self.journal.push(Record::Telemetry(TelemetryRecord {
-                frame: heard.id,
-                route: heard.route.clone(),
-                at: heard.at.utc,
-                decoder_version: DECODER_VERSION,
-                points,
-            }));
+            if !heard.has_values {
+                self.journal.push(Record::Telemetry(TelemetryRecord {
+                    frame: heard.id,
+                    route: heard.route.clone(),
+                    at: heard.at.utc,
+                    decoder_version: DECODER_VERSION,
+                    points,
+                }));
+            }
         }
         self.packet(heard, &packet);
     }

@@ -69,6 +69,11 @@ impl Journal {
         }
     }
 
+    /// Records that wait.
+    pub(super) const fn waiting(&self) -> usize {
+        self.pending.len()
+    }
+
     /// Nothing more is taken: storage has been behind for too long.
     pub(super) fn is_full(&self) -> bool {
         self.pending.len() >= FRAME_BOUND

@@ -192,6 +192,18 @@ impl Station {
         }
     }
 
+    /// What others report of the present may raise an alarm; that all is well again only our own radio can say.
+    pub(super) fn limits_by_others(&mut self, heard: &Heard, points: &[Point]) {
+        let s = self.links[heard.link].satellite;
+        for point in points {
+            let value = point.value.unwrap_or(f64::NAN);
+            let known = self.satellites[s].limits.iter().find(|limit| limit.parameter() == point.parameter);
+            if known.is_some_and(|limit| limit.is_worse(value)) {
+                self.limit(heard, s, &point.parameter, value);
+            }
+        }
+    }
+
     fn limit(&mut self, heard: &Heard, s: usize, parameter: &str, value: f64) {
         let sat = &mut self.satellites[s];
         let Some(limit) = sat.limits.iter_mut().find(|limit| limit.parameter() == parameter) else { return };
@@ -282,7 +294,7 @@ impl Station {
             self.heard_event(heard, EventKind::ChunkReceived, Level::Watch, message);
             return;
         };
-        if !heard.live && heard.from_radio && heard.at.utc < image.record.declared_at {
+        if !heard.live && heard.at.utc < image.record.declared_at {
             let message =
                 format!("chunk {index} was heard before image {} was declared: kept raw", image.record.id);
             self.heard_event(heard, EventKind::ChunkReceived, Level::Watch, message);

@@ -9,6 +9,7 @@ use super::image::Assembly;
 use super::journal::Journal;
 use super::link::Link;
 use super::outcome::mono_of;
+use super::recent::{Recent, Recents};
 use super::runner::{LastEnd, Run};
 use super::satellite::{Before, Command, Download, Exchange, Satellite, Settling};
 use super::sealing::Sealer;
@@ -43,6 +44,12 @@ pub(super) fn station(
             satellite(&config, sat, left, &snapshot, now)
         })
         .collect();
+    let mut recent = Recents::default();
+    for left in &snapshot.recent {
+        if let Some(s) = satellites.iter().position(|sat| sat.id == left.satellite) {
+            recent.remember(Recent::of(left, s));
+        }
+    }
     let links = config
         .links
         .iter()
@@ -70,7 +77,7 @@ pub(super) fn station(
         plans: snapshot.plans,
         ids: snapshot.last_ids,
         last_tx: 0,
-        recent: VecDeque::new(),
+        recent,
         synchronised: false,
         vouched: false,
         stopping: false,

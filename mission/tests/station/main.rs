@@ -17,6 +17,7 @@ mod health;
 mod images;
 mod locks;
 mod order;
+mod outside;
 mod plans;
 mod restarts;
 mod sky;

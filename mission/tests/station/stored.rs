@@ -99,6 +99,7 @@ impl World {
         downloads.retain(|found| found.state == DownloadState::Active);
         let open = |c: &CommandSnapshot| !c.stage.is_final() || c.stage == Stage::Unknown;
         Snapshot {
+            recent: Vec::new(),
             last_ids: ids,
             satellites: vec![SatelliteSnapshot {
                 satellite: self.satellite.clone(),

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use mission::reception::{NotTaken, Taken};
 use mission::record::{DownloadState, EventKind, ImageRecord, StageRecord};
 use mission::snapshot::Witness;
 use mission::{
@@ -77,6 +78,7 @@ pub(crate) struct World {
     pub(crate) transmits: Vec<Transmit>,
     pub(crate) replies: Vec<(IntentId, Result<Accepted, Refusal>)>,
     pub(crate) reserve: Vec<ReservedFrame>,
+    pub(crate) taken: Vec<(u64, Result<Taken, NotTaken>)>,
     pub(crate) reserve_clears: usize,
     pub(crate) witness: Witness,
     pub(crate) synchronised: bool,
@@ -135,6 +137,7 @@ impl World {
             transmits: Vec::new(),
             replies: Vec::new(),
             reserve: Vec::new(),
+            taken: Vec::new(),
             reserve_clears: 0,
             witness: Witness::Missing,
             synchronised: true,
@@ -220,6 +223,7 @@ impl World {
                 self.transmits.push(transmit);
             }
             Effect::Reply { intent, result } => self.replies.push((intent, result)),
+            Effect::Taken { delivery, result } => self.taken.push((delivery, result)),
             Effect::Reserve(frame) => self.reserve.push(frame),
             Effect::ReserveClear => {
                 self.reserve_clears += 1;

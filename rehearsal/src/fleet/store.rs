@@ -74,6 +74,7 @@ impl Stores {
             Record::Run(run) => run.satellite.clone(),
             Record::Event(event) => event.satellite.clone()?,
             Record::Reception(_)
+            | Record::Outside(_)
             | Record::ReceptionRssi(_)
             | Record::Telemetry(_)
             | Record::Audit(_)

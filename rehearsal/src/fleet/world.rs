@@ -396,6 +396,7 @@ impl Fleet {
             Effect::Witness { key, counter } => self.grounds[g].due.push_back(Due::Witness(key, counter)),
             Effect::Transmit(transmit) => self.transmit(g, &transmit)?,
             Effect::Reply { intent, result } => self.answered(g, intent.0, result.err()),
+            Effect::Taken { .. } => {}
             Effect::Reserve(frame) => self.grounds[g].stores.reserve.push(frame),
             Effect::ReserveClear => self.grounds[g].stores.reserve.clear(),
         }

@@ -4,10 +4,11 @@
 use api::ProblemKind as K;
 use api::{
     AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, DownloadRequest,
-    DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView,
-    HandoverReport, Health, HeldElements, ImageView, LatestValue, LimitView, LookList, MonthReport, Nothing,
-    Outcome, ParameterView, PassKept, PassList, PassReport, PlanText, PlanView, RunReport, RunView,
-    ScheduleView, StationView, StreamMessage, StreamRequest, TelemetryPage, Version,
+    DownloadView, EarView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView,
+    HandoverReport, Health, HeldElements, ImageView, ImportReport, ImportRequest, LatestValue, LimitView,
+    LookList, MonthReport, Nothing, Outcome, OutsideView, ParameterView, PassKept, PassList, PassReport,
+    PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, StreamMessage, StreamRequest,
+    TelemetryPage, Version,
 };
 
 use super::operation::{Doc, Kind, Param, delete, get, param, post, required};
@@ -106,6 +107,35 @@ fn archive() -> Vec<Doc> {
         get("/api/v1/frames/{id}", "archive", "get_frame", "One frame, decoded field by field")
             .json::<FrameView>()
             .problems(&[K::NotFound]),
+        get("/api/v1/receptions", "archive", "list_receptions", "What others heard: TinyGS, SatNOGS, files")
+            .query(&[
+                SATELLITE,
+                param(
+                    "source",
+                    Kind::OneOf(&["own-mqtt", "tinygs-api", "satnogs", "console", "file"]),
+                    "Only through this ear.",
+                ),
+                param(
+                    "kind",
+                    Kind::OneOf(&["frame", "repairable", "damaged", "detection"]),
+                    "Only of this kind.",
+                ),
+                param("original", Kind::OneOf(&["true", "false"]), "With each report as it came."),
+                FROM,
+                UNTIL,
+                AFTER,
+                BEFORE,
+                LIMIT,
+            ])
+            .page::<OutsideView>(),
+        post("/api/v1/receptions", "archive", "import_receptions", "Hand in what somebody heard")
+            .more("The same reports again change nothing. What is refused is counted by its reason under /ears.")
+            .body::<ImportRequest>()
+            .json::<ImportReport>()
+            .problems(&INTENT)
+            .problems(&[K::BadArgument, K::UnknownSatellite]),
+        get("/api/v1/ears", "archive", "ears", "What came in by each ear, and what was refused of it")
+            .page::<EarView>(),
         get("/api/v1/telemetry", "archive", "telemetry", "One parameter over time, thinned where there is much")
             .query(&[
                 required("parameter", Kind::Text, "Which, e.g. `heartbeat.temp`."),

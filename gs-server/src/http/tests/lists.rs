@@ -9,8 +9,9 @@ use super::super::openapi::document;
 use super::{Answer, Bench, TOKEN, heartbeat, image_info, request};
 
 /// The lists, and the field that says when.
-const LISTS: [(&str, &str); 17] = [
+const LISTS: [(&str, &str); 18] = [
     ("frames", "heard_at"),
+    ("receptions", "received_at"),
     ("commands", "created_at"),
     ("downloads", "created_at"),
     ("images", "declared_at"),
@@ -29,7 +30,7 @@ const LISTS: [(&str, &str); 17] = [
     ("tokens", "created_at"),
 ];
 /// What is no record of a moment: it is how things stand.
-const TIMELESS: [&str; 4] = ["parameters", "telemetry/latest", "elements/sources", "alerts/targets"];
+const TIMELESS: [&str; 5] = ["ears", "parameters", "telemetry/latest", "elements/sources", "alerts/targets"];
 
 #[test]
 fn every_list_of_the_document_takes_start_and_stop() {

@@ -163,6 +163,8 @@ impl Bench {
         })
         .unwrap();
         let state = HttpState {
+            ears: crate::ingest::Ears::new(store.clone(), inbox.clone(), Arc::clone(&timer)),
+            aliases: crate::ingest::Aliases::default(),
             alerts: alerts.clone(),
             elements: ElementsHandle::without_sources(wanted, Arc::clone(&timer)),
             store: store.clone(),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use mission::port::ReservedFrame;
-use mission::{FrameId, SatelliteId, UtcUs};
+use mission::{FrameId, SatelliteId, Source, UtcUs};
 use protocol::down_type;
 
 use super::super::convert::{narrow, route};
@@ -56,8 +56,8 @@ impl Store {
             last = (newest.heard_at_us, newest.id);
             let mut receptions = self.first_receptions(&frames).await?;
             for frame in frames {
-                let Some(first) = receptions.remove(&frame.id) else { continue };
-                told.push((FrameId(narrow("frames.id", frame.id)?), as_kept(frame, &first)?));
+                let first = receptions.remove(&frame.id);
+                told.push((FrameId(narrow("frames.id", frame.id)?), as_kept(frame, first.as_ref())?));
             }
         }
         Ok(told)
@@ -104,13 +104,14 @@ impl Store {
     }
 }
 
-/// A frame as the engine takes it.
-pub(super) fn as_kept(frame: FrameRow, first: &ReceptionRow) -> Result<ReservedFrame, StoreError> {
+/// A frame as the engine takes it. What no station heard, only strangers, has no first reception.
+pub(super) fn as_kept(frame: FrameRow, first: Option<&ReceptionRow>) -> Result<ReservedFrame, StoreError> {
+    let (station, link) = first.map_or((&frame.station, &frame.link), |first| (&first.station, &first.link));
     Ok(ReservedFrame {
-        route: route(&first.satellite, &first.station, &first.link)?,
-        source: first.source()?,
+        route: route(&frame.satellite, station, link)?,
+        source: first.map_or(Ok(Source::File), ReceptionRow::source)?,
         received_at: UtcUs(frame.heard_at_us),
-        rssi_dbm: first.rssi_dbm.and_then(|dbm| i16::try_from(dbm).ok()),
+        rssi_dbm: first.and_then(|first| i16::try_from(first.rssi_dbm?).ok()),
         bytes: frame.bytes.into(),
     })
 }

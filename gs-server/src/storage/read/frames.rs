@@ -75,8 +75,10 @@ impl Store {
     /// [`StoreError`] when the database cannot be read or holds what nobody wrote.
     pub async fn frame_as_kept(&self, id: FrameId) -> Result<Option<ReservedFrame>, StoreError> {
         let Some(heard) = self.frame(int("frame", id.0)?).await? else { return Ok(None) };
-        let Some(first) = heard.receptions.first().filter(|_| !heard.frame.nested) else { return Ok(None) };
-        as_kept(heard.frame, first).map(Some)
+        if heard.frame.nested {
+            return Ok(None);
+        }
+        as_kept(heard.frame, heard.receptions.first()).map(Some)
     }
 
     /// Those of these frames that the archive does not have: the reserve may hold some that were stored after all.

@@ -40,7 +40,7 @@ pub struct Page {
 }
 
 impl Page {
-    fn rows(&self) -> i64 {
+    pub(in crate::storage) fn rows(&self) -> i64 {
         match self.limit {
             0 => 100,
             limit => i64::from(limit.min(1000)),

@@ -20,6 +20,7 @@ macro_rules! both {
 
 mod alerts;
 mod audit;
+mod bulk;
 mod conformance;
 mod damage;
 mod folder;

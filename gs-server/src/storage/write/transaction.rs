@@ -1,5 +1,6 @@
 //! Records on their way into rows, within one transaction.
 
+use mission::reception::ELSEWHERE;
 use mission::record::{
     AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, PassRecord,
     ReceptionRssi, Record, Route, StageRecord, TelemetryRecord,
@@ -8,7 +9,6 @@ use mission::{Batch, Stage, StationId};
 use sqlx::AssertSqlSafe;
 
 use super::Memory;
-use crate::storage::audit_chain;
 use crate::storage::convert::{int, route};
 use crate::storage::db::{Builder, Connection, sql};
 use crate::storage::pg::Fence;
@@ -19,6 +19,7 @@ use crate::storage::rows::{
     ReceptionRow, RouteRow, RunRow, SealedRow, StageRow, TelemetryRow,
 };
 use crate::storage::{StoreError, StoredEvent};
+use crate::storage::{audit_chain, ears};
 
 /// Rows in one statement: far below the limit on parameters of either database.
 const ROWS_PER_STATEMENT: usize = 500;
@@ -35,15 +36,23 @@ pub(in crate::storage) struct Transaction<'a> {
 impl Transaction<'_> {
     pub(in crate::storage) async fn batch(&mut self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
         let mut events = Vec::new();
+        // What others heard comes by the thousand: in few statements, at the end (references are checked at the commit).
+        let (mut frames, mut reports) = (Vec::new(), Vec::new());
         for record in &batch.records {
-            events.extend(self.write(record, batch).await?);
+            match record {
+                Record::Outside(report) => reports.push(report.as_ref()),
+                Record::Frame(frame) if frame.route.station.as_str() == ELSEWHERE => frames.push(frame),
+                _ => events.extend(self.write(record, batch).await?),
+            }
         }
+        ears::insert(self.connection, &frames, &reports).await?;
         Ok(events)
     }
 
     async fn write(&mut self, record: &Record, batch: &Batch) -> Result<Option<StoredEvent>, StoreError> {
         match record {
             Record::Frame(frame) => self.frame(&FrameRow::of(frame)?).await?,
+            Record::Outside(report) => ears::insert(self.connection, &[], &[report]).await?,
             Record::Reception(reception) => self.insert(&ReceptionRow::of(reception)?).await?,
             Record::ReceptionRssi(rssi) => self.set_rssi(rssi).await?,
             Record::Telemetry(telemetry) => self.telemetry(telemetry).await?,

@@ -1,0 +1,92 @@
+//! Our own export: one reception a line, with everything that is known of it.
+
+use mission::UtcUs;
+use mission::reception::{Content, Ear, RadioCrc, Reception, Refusal, Said, Signal};
+use serde_json::{Map, Value, json};
+
+use super::Context;
+use super::value::{Fields, stamp};
+
+/// The line of a reception.
+pub fn export(reception: &Reception) -> String {
+    let bytes = match &reception.content {
+        Content::Frame { bytes, .. } => Some(hex::encode(bytes)),
+        Content::Damaged { delivered, .. } => Some(hex::encode(delivered)),
+        Content::Detection => None,
+    };
+    let Reception { receiver, signal, .. } = reception;
+    json!({
+        "pixelsat_reception": 1,
+        "source": reception.ear.name(),
+        "source_id": reception.source_id,
+        "receiver": {
+            "id": receiver.id, "name": receiver.name, "latitude_deg": receiver.latitude_deg,
+            "longitude_deg": receiver.longitude_deg, "altitude_m": receiver.altitude_m,
+        },
+        "received_at": time(reception.received_at),
+        "time_basis": reception.time_basis.name(),
+        "frequency_hz": signal.frequency_hz,
+        "frequency_offset_hz": signal.frequency_offset_hz,
+        "doppler_hz": signal.doppler_hz,
+        "frequency_error_hz": signal.frequency_error_hz,
+        "spreading_factor": signal.spreading_factor,
+        "bandwidth_hz": signal.bandwidth_hz,
+        "coding_rate": signal.coding_rate,
+        "rssi_dbm": signal.rssi_dbm,
+        "snr_db": signal.snr_db,
+        "radio_crc": reception.radio_crc.name(),
+        "noisy": reception.noisy,
+        "label": reception.label,
+        "norad": reception.norad,
+        "hex": bytes,
+    })
+    .to_string()
+}
+
+fn time(at: UtcUs) -> Option<String> {
+    jiff::Timestamp::from_microsecond(at.0).ok().map(|at| format!("{at:.6}"))
+}
+
+/// A line that [`export`] wrote.
+pub(super) fn said(object: &Map<String, Value>, body: &[u8], context: &Context) -> Result<Said, Refusal> {
+    let mut fields = Fields::of(object, mission::reception::Doubts::default());
+    let ear = fields.text("source").and_then(Ear::from_name).unwrap_or(Ear::File);
+    let source_id = fields.text("source_id").ok_or(Refusal::Malformed)?.to_owned();
+    let mut said = context.said(ear, source_id);
+    said.times.stated = fields.text("received_at").and_then(stamp).or(said.times.stated);
+    if fields.text("time_basis") == Some("import") {
+        said.times.stated = context.at;
+    }
+    said.signal = Signal {
+        frequency_hz: fields.number("frequency_hz"),
+        frequency_offset_hz: fields.number("frequency_offset_hz"),
+        doppler_hz: fields.number("doppler_hz"),
+        frequency_error_hz: fields.number("frequency_error_hz"),
+        spreading_factor: fields.small("spreading_factor"),
+        bandwidth_hz: fields.number("bandwidth_hz"),
+        coding_rate: fields.small("coding_rate"),
+        rssi_dbm: fields.number("rssi_dbm"),
+        snr_db: fields.number("snr_db"),
+    };
+    said.radio_crc = match fields.text("radio_crc") {
+        Some("right") => RadioCrc::Right,
+        Some("wrong") => RadioCrc::Wrong,
+        _ => RadioCrc::Unknown,
+    };
+    said.noisy = fields.truth("noisy").unwrap_or(false);
+    said.label = fields.text("label").map(str::to_owned);
+    said.norad = fields.catalogue("norad");
+    said.bytes = fields.text("hex").map(hex::decode).transpose().map_err(|_| Refusal::BadBytes)?;
+    said.doubts = fields.doubts;
+    if let Some(Value::Object(receiver)) = object.get("receiver") {
+        let mut fields = Fields::of(receiver, said.doubts);
+        said.receiver.id = fields.text("id").map(str::to_owned);
+        said.receiver.name = fields.text("name").map(str::to_owned);
+        said.receiver.latitude_deg = fields.number("latitude_deg");
+        said.receiver.longitude_deg = fields.number("longitude_deg");
+        said.receiver.altitude_m = fields.number("altitude_m");
+        said.doubts = fields.doubts;
+    }
+    said.original = Some(body.into());
+    Ok(said)
+}

@@ -1,0 +1,185 @@
+//! What others heard: into the archive and into the gaps of images, and nowhere else.
+//!
+//! Anyone can make a report up. So nothing of it is contact, answers a command, declares an image, settles what a Reset
+//! did or feeds a condition of a plan. A value of the present may raise an alarm, never end one.
+
+use protocol::{DownFrame, Downlink};
+
+use super::Station;
+use super::intake::Heard;
+use super::recent::Recent;
+use crate::clock::Now;
+use crate::id::{FrameId, LinkId, SatelliteId, StationId};
+use crate::level::Level;
+use crate::port::Effect;
+use crate::reception::{Delivered, ELSEWHERE, Known, NotTaken, Reception, Taken, UNDATED};
+use crate::record::{DECODER_VERSION, EventKind, FrameRecord, OutsideRecord, Record, Route, TelemetryRecord};
+use crate::telemetry;
+
+/// Above this many waiting records strangers wait: the rest of the room is for the radio.
+const ROOM: usize = 20_000;
+/// A report of a frame that was heard within this time tells of the present, microseconds.
+const FRESH_US: u64 = 600_000_000;
+/// So many frames of one delivery have an event each; whoever sends thousands has not that many things to tell.
+const TOLD: u32 = 20;
+
+impl Station {
+    pub(super) fn take_outside(&mut self, now: Now, delivery: u64, receptions: &[Delivered]) {
+        let refuse = if self.stopping {
+            Some(NotTaken::Stopping)
+        } else if self.journal.failing().is_some() || self.journal.waiting() > ROOM {
+            Some(NotTaken::Busy)
+        } else if receptions.iter().any(|delivered| self.satellite_index(&delivered.satellite).is_none()) {
+            Some(NotTaken::UnknownSatellite)
+        } else {
+            None
+        };
+        if let Some(refusal) = refuse {
+            self.effects.push_back(Effect::Taken { delivery, result: Err(refusal) });
+            return;
+        }
+        let (mut taken, mut told) = (Taken::default(), 0);
+        for delivered in receptions {
+            self.take_report(now, delivered, &mut taken, &mut told);
+        }
+        self.journal.when_durable(Effect::Taken { delivery, result: Ok(taken) });
+    }
+
+    fn take_report(&mut self, now: Now, delivered: &Delivered, taken: &mut Taken, told: &mut u32) {
+        let Some(s) = self.satellite_index(&delivered.satellite) else { return };
+        let reception = &delivered.reception;
+        let parsed = reception.frame().and_then(|bytes| DownFrame::parse(bytes).ok());
+        let Some(frame) = parsed else {
+            taken.without_frame += 1;
+            self.push_outside(now, delivered, None);
+            return;
+        };
+        let at = (reception.received_at, reception.is_dated());
+        let remembered = self.recent.find(s, frame.bytes(), at).map(|recent| {
+            let known = Known { frame: recent.id, dated: recent.dated };
+            if at.1 && !recent.dated {
+                (recent.at, recent.dated) = at;
+            }
+            known
+        });
+        match remembered.or(delivered.known) {
+            Some(known) => {
+                taken.merged += 1;
+                self.push_outside(now, delivered, Some(known.frame));
+                if at.1 && !known.dated {
+                    self.derive(now, s, delivered, known.frame, &frame, told);
+                }
+            }
+            None => {
+                taken.frames += 1;
+                self.ids.frame += 1;
+                let id = FrameId(self.ids.frame);
+                let Some(route) = route(&delivered.satellite, reception) else { return };
+                self.journal.push(Record::Frame(FrameRecord {
+                    id,
+                    route,
+                    bytes: frame.bytes().into(),
+                    form: frame.form(),
+                    packet_type: frame.header().map(|header| header.packet_type),
+                    tag: frame.tag(),
+                    nested: false,
+                    heard_at: reception.received_at,
+                }));
+                self.push_outside(now, delivered, Some(id));
+                self.recent.remember(Recent {
+                    id,
+                    satellite: s,
+                    at: reception.received_at,
+                    bytes: frame.bytes().into(),
+                    elsewhere: true,
+                    dated: at.1,
+                });
+                self.derive(now, s, delivered, id, &frame, told);
+            }
+        }
+    }
+
+    fn push_outside(&mut self, now: Now, delivered: &Delivered, frame: Option<FrameId>) {
+        self.journal.push(Record::Outside(Box::new(OutsideRecord {
+            satellite: delivered.satellite.clone(),
+            station: self.station.clone(),
+            frame,
+            reception: delivered.reception.clone(),
+            taken_at: now.utc,
+        })));
+    }
+
+    /// Values, images and what is worth an event, of a frame that is new.
+    fn derive(
+        &mut self,
+        now: Now,
+        s: usize,
+        delivered: &Delivered,
+        id: FrameId,
+        frame: &DownFrame<'_>,
+        told: &mut u32,
+    ) {
+        let reception = &delivered.reception;
+        let Some(route) = route(&delivered.satellite, reception) else { return };
+        let Some(link) = self.links.iter().position(|link| link.satellite == s) else { return };
+        let heard = Heard {
+            id,
+            route,
+            link,
+            at: Now { mono: now.mono, utc: reception.received_at },
+            tag: None,
+            live: false,
+            from_radio: false,
+            length: frame.bytes().len(),
+            repeat: false,
+            has_values: false,
+        };
+        let is_fresh = reception.is_dated() && now.utc.0.abs_diff(heard.at.utc.0) <= FRESH_US;
+        let packet = frame.packet();
+        let is_of_image = matches!(packet, Ok(Downlink::ImageInfo(_) | Downlink::ImageChunk(_)));
+        *told += u32::from(is_fresh);
+        if (is_fresh && *told <= TOLD) || is_of_image {
+            let what = packet.as_ref().map_or("frame", Downlink::name);
+            let (bytes, ear) = (frame.bytes().len(), reception.ear.name());
+            let who = reception.receiver.name.as_deref().or(reception.receiver.id.as_deref());
+            let who = who.unwrap_or("somebody");
+            let message = format!("{what} of {bytes} bytes was heard by {who}, as {ear} reports");
+            self.heard_event(&heard, EventKind::FrameHeard, Level::Normal, message);
+        }
+        let Ok(packet) = packet else { return };
+        if !reception.is_dated() {
+            if matches!(packet, Downlink::ImageChunk(_)) {
+                let message =
+                    "a chunk whose time is not known may belong to another image: kept raw".to_owned();
+                self.heard_event(&heard, EventKind::ChunkReceived, Level::Watch, message);
+            }
+            return;
+        }
+        let points = telemetry::points(&packet);
+        if !points.is_empty() {
+            if is_fresh {
+                self.limits_by_others(&heard, &points);
+            }
+            self.journal.push(Record::Telemetry(TelemetryRecord {
+                frame: id,
+                route: heard.route.clone(),
+                at: heard.at.utc,
+                decoder_version: DECODER_VERSION,
+                points,
+            }));
+        }
+        if is_of_image {
+            self.packet(&heard, &packet);
+        }
+    }
+}
+
+/// How the rows of what others heard are filed.
+fn route(satellite: &SatelliteId, reception: &Reception) -> Option<Route> {
+    let link = if reception.is_dated() { reception.ear.name() } else { UNDATED };
+    Some(Route {
+        satellite: satellite.clone(),
+        station: StationId::new(ELSEWHERE).ok()?,
+        link: LinkId::new(link).ok()?,
+    })
+}
