@@ -7,31 +7,28 @@
 //! Order at the end, 5 s in all: the API takes nothing new and the engine radiates nothing new, links finish the frame
 //! that is on the air and the antenna parks, everything that came in becomes durable, the archive is closed.
 
+mod archive;
 mod error;
+mod options;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use futures_util::FutureExt as _;
-use futures_util::future::BoxFuture;
-use mission::port::ReservedFrame;
-use mission::{
-    Clock as _, Entropy, FrameId, Intent, LinkId, Principal, Snapshot, StationConfig, StationId, UtcUs,
-};
+use mission::{Intent, LinkId, Principal};
 use protocol::Key;
 use tokio::net::TcpListener;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
 use crate::alerts::{AlertsParts, AlertsTask, Watched};
-use crate::clock::{ScaledClock, SystemClock, Timer, Wire};
-use crate::config::{Changes, Config, ConfigError, TwoPerson, station_config};
+use crate::clock::{SystemClock, Timer};
+use crate::config::{Changes, Config, TwoPerson, station_config};
 use crate::elements::task::ElementsTask;
 use crate::elements::{Door, ElementsHandle, Fetcher, Wanted};
-use crate::engine::{Engine, EngineHandle, EngineInbox, EngineParts, LinkPort, OsEntropy};
+use crate::engine::{Engine, EngineHandle, EngineParts, LinkPort, OsEntropy};
 use crate::hamlib::{self, AntennaTask};
 use crate::http::{self, AllowedHosts, HttpState, Identity, RadioOnAir, Tls, TlsFiles, Token};
 use crate::hub::Hub;
@@ -45,9 +42,12 @@ use crate::others::Follower;
 use crate::people::{People, PeopleSettings};
 use crate::pointing::{Place, Steering};
 use crate::report::ReportTask;
-use crate::storage::{EventQuery, Page, Postgres, Store, StoreError, StoreOptions};
+use crate::storage::{Store, StoreError};
 
+use archive::images_elsewhere;
+pub(crate) use archive::{clock_for, newest_event, not_yet_stored, open_store, snapshot};
 pub use error::RunError;
+pub use options::{Ready, Report, RunOptions, SetLogFilter};
 
 /// What requests under way may take at the end.
 const API_END: Duration = Duration::from_millis(600);
@@ -57,79 +57,6 @@ const LINKS_END: Duration = Duration::from_millis(2_800);
 const ENGINE_END: Duration = Duration::from_millis(900);
 /// What closing the archive may take.
 const STORE_END: Duration = Duration::from_millis(400);
-
-/// Puts a new log filter into force.
-pub type SetLogFilter = Box<dyn Fn(&str) + Send + Sync>;
-
-/// What a caller may bring along. [`RunOptions::new`] brings what `serve` needs.
-pub struct RunOptions {
-    /// The configuration; checked by [`run_with`].
-    pub config: Config,
-    /// The clock; made from the configuration when `None`.
-    pub timer: Option<Arc<dyn Timer>>,
-    /// The store, opened; opened from the configuration when `None`.
-    pub store: Option<Store>,
-    /// The engine's randomness; the operating system's when `None`.
-    pub entropy: Option<Box<dyn Entropy>>,
-    /// For links whose far end lives in this process, on a stepped clock: how the bytes between are counted.
-    pub wires: BTreeMap<LinkId, Wire>,
-    /// Told once, when the archive is open, the links run and the API listens.
-    pub ready: Option<oneshot::Sender<Ready>>,
-    /// Changed configurations (SIGHUP): what can be applied is, what needs a restart is named in the log.
-    pub reload: Option<mpsc::Receiver<Config>>,
-    /// Called with the new log filter when a reload brings one.
-    pub set_log_filter: Option<SetLogFilter>,
-    /// Facts of a demo for the page and the API.
-    pub demo: Option<serde_json::Value>,
-    /// Where the configuration was read from; it goes into backups.
-    pub config_file: Option<PathBuf>,
-}
-
-impl RunOptions {
-    /// Everything from the configuration and the machine.
-    pub fn new(config: Config) -> Self {
-        Self {
-            config,
-            timer: None,
-            store: None,
-            entropy: None,
-            wires: BTreeMap::new(),
-            ready: None,
-            reload: None,
-            set_log_filter: None,
-            demo: None,
-            config_file: None,
-        }
-    }
-}
-
-/// A server that is ready.
-#[derive(Clone)]
-pub struct Ready {
-    /// Where the API listens.
-    pub address: SocketAddr,
-    /// Where it listens with TLS, if it does.
-    pub secure: Option<SocketAddr>,
-    /// The engine.
-    pub engine: EngineHandle,
-    /// For sources of the caller's own, such as what is in view.
-    pub inbox: EngineInbox,
-    /// Committed events.
-    pub hub: Hub,
-    /// The store.
-    pub store: Store,
-    /// The clock.
-    pub timer: Arc<dyn Timer>,
-    /// Who may come in.
-    pub people: People,
-}
-
-/// How a run ended well.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Report {
-    /// Tasks that did not end in time and were left behind.
-    pub abandoned_tasks: usize,
-}
 
 /// Runs a server until `stop`.
 ///
@@ -373,7 +300,6 @@ pub async fn run_with(
     Ok(Report { abandoned_tasks })
 }
 
-/// Who may come in. Sessions and links run on this machine's clock, however fast the station's own goes.
 /// A listener with TLS, and its address, where the configuration wants one.
 async fn secure(
     config: &Config,
@@ -388,6 +314,7 @@ async fn secure(
     Ok(Some(((listener, tls), address)))
 }
 
+/// Who may come in. Sessions and links run on this machine's clock, however fast the station's own goes.
 async fn people(
     config: &Config,
     store: &Store,
@@ -444,111 +371,6 @@ pub(crate) fn load_keys(config: &Config) -> Result<BTreeMap<String, Key>, RunErr
         loaded.insert(satellite.name.clone(), file.key);
     }
     Ok(loaded)
-}
-
-/// The clock of the configuration. A simulated one that ran ahead of life goes on where the last run left it: to a
-/// restart, records of the future would be answers that are still to come.
-pub(crate) fn clock_for(config: &Config, last: Option<UtcUs>) -> Arc<dyn Timer> {
-    let Some(simulation) = config.simulation else { return Arc::new(SystemClock::new()) };
-    let clock = ScaledClock::new(simulation.speed);
-    match last.filter(|last| *last > clock.now().utc) {
-        Some(last) => Arc::new(ScaledClock::starting_at(simulation.speed, last)),
-        None => Arc::new(clock),
-    }
-}
-
-/// When the newest event of the archive happened. Owns what it reads with, as [`snapshot`] does.
-pub(crate) fn newest_event(store: &Store) -> BoxFuture<'static, Result<Option<UtcUs>, StoreError>> {
-    let store = store.clone();
-    let query = EventQuery {
-        page: Page { before: Some(i64::MAX), limit: 1, ..Page::default() },
-        ..EventQuery::default()
-    };
-    async move { Ok(store.events(&query).await?.first().map(|event| event.record.at)) }.boxed()
-}
-
-pub(crate) async fn open_store(
-    config: &Config,
-    station: &StationId,
-    brought: Option<Store>,
-) -> Result<Store, RunError> {
-    let simulated = config.is_simulated();
-    let store = match brought {
-        Some(store) => store,
-        None => {
-            let options = StoreOptions {
-                folder: config.storage.folder.clone(),
-                station: Some(station.clone()),
-                simulated,
-                postgres: postgres(config)?,
-                max_page_count: config.storage.max_page_count,
-                reserve_bytes: config.storage.reserve_bytes,
-            };
-            // On a thread that may wait: migrations and the check of a large archive take their time.
-            let runtime = tokio::runtime::Handle::current();
-            let opened = tokio::task::spawn_blocking(move || runtime.block_on(Store::open(options))).await;
-            opened.map_err(|source| RunError::Io {
-                what: "the archive cannot be opened: the thread that did it died",
-                source: std::io::Error::other(source),
-            })??
-        }
-    };
-    if store.is_simulated() == simulated {
-        Ok(store)
-    } else {
-        Err(RunError::StoreKind { simulated: store.is_simulated() })
-    }
-}
-
-/// Owns what it reads with, as [`snapshot`] does.
-fn images_elsewhere(
-    store: &Store,
-    station: &StationConfig,
-) -> BoxFuture<'static, Result<Vec<(FrameId, ReservedFrame)>, StoreError>> {
-    let store = store.clone();
-    let satellites: Vec<_> = station.satellites.iter().map(|satellite| satellite.id.clone()).collect();
-    async move {
-        let mut frames = Vec::new();
-        for satellite in &satellites {
-            frames.extend(store.images_elsewhere(satellite).await?);
-        }
-        Ok(frames)
-    }
-    .boxed()
-}
-
-/// Owns what it reads with, as [`snapshot`] does.
-pub(crate) fn not_yet_stored(
-    store: &Store,
-    kept: Vec<ReservedFrame>,
-) -> BoxFuture<'static, Result<Vec<ReservedFrame>, StoreError>> {
-    let store = store.clone();
-    async move { store.not_yet_stored(kept).await }.boxed()
-}
-
-/// The shared database of the configuration, with its password.
-fn postgres(config: &Config) -> Result<Option<Postgres>, RunError> {
-    let Some(url) = &config.storage.database else { return Ok(None) };
-    // The address was checked with the configuration.
-    let postgres = Postgres::new(url).map_err(|problem| {
-        ConfigError::value("storage.database", problem, "Write postgres://user@host/database.")
-    })?;
-    Ok(Some(match &config.storage.password_file {
-        Some(file) => postgres.with_password_file(file)?,
-        None => postgres,
-    }))
-}
-
-/// Owns what it reads with: a future that borrows it is not `Send` enough for whoever spawns a run.
-pub(crate) fn snapshot(
-    store: &Store,
-    station: &StationConfig,
-) -> BoxFuture<'static, Result<Snapshot, StoreError>> {
-    let store = store.clone();
-    let satellites: Vec<_> = station.satellites.iter().map(|satellite| satellite.id.clone()).collect();
-    let keys: Vec<_> =
-        station.satellites.iter().filter_map(|satellite| satellite.key.as_ref().map(Key::id)).collect();
-    async move { store.snapshot(&satellites, &keys).await }.boxed()
 }
 
 /// Elements from the sources of the configuration: a task of its own, where there are any.

@@ -83,6 +83,15 @@ pub enum StoreError {
         #[source]
         source: io::Error,
     },
+    /// The database's server does not let this user in, or not do this.
+    #[error(
+        "the database's server refuses ({said}): look at the user and the database in storage.database, at its password \
+         (storage.password_file), and at what it may do there"
+    )]
+    NotLetIn {
+        /// What the server said.
+        said: String,
+    },
     /// The file with the password for the database.
     #[error("the password for the database cannot be taken from {}: {problem}", path.display())]
     PasswordFile {
@@ -219,7 +228,7 @@ fn of_postgres(code: &str, text: &str, error: sqlx::Error) -> StoreError {
         "53100" => StoreError::Full,
         "58030" => io(),
         "XX001" | "XX002" => StoreError::damaged(text),
-        "42501" | "28000" | "28P01" => StoreError::Permission { path: "the database".into() },
+        "42501" | "28000" | "28P01" | "3D000" => StoreError::NotLetIn { said: text.to_owned() },
         // Too many connections, out of memory, shutting down, starting up, a statement or a wait that took too long.
         "57014" | "55P03" | "25P03" | "25006" => StoreError::away(text),
         _ => match code.get(..2).unwrap_or_default() {
