@@ -37,6 +37,9 @@ use transmit::Sending;
 const CLOSED_BACK_OFF_US: [u64; 3] = [100_000, 250_000, 500_000];
 /// Pauses before reopening a port whose module does not work; the last one repeats.
 const FAULT_BACK_OFF_US: [u64; 4] = [500_000, 1_000_000, 2_000_000, 5_000_000];
+/// Pauses between looks at a module that did not answer when it was brought up; the last one repeats. Each look begins with
+/// a frame that was refused: only then may something be radiated, which a command to a module without the switch is.
+const LOOK_AGAIN_US: [u64; 3] = [5_000_000, 15_000_000, 60_000_000];
 /// Received bytes held for a shell that does not drain; beyond, the oldest output is not touched and new bytes are
 /// counted as discarded.
 const UNDRAINED_BYTES: usize = 1 << 20;
@@ -66,6 +69,8 @@ pub struct Driver {
     reopen_at_us: u64,
     closed_tries: usize,
     fault_tries: usize,
+    look_again_at_us: u64,
+    looks: usize,
 }
 
 impl Driver {
@@ -91,6 +96,8 @@ impl Driver {
             reopen_at_us: 0,
             closed_tries: 0,
             fault_tries: 0,
+            look_again_at_us: 0,
+            looks: 0,
         }
     }
 
@@ -186,6 +193,7 @@ impl Driver {
         self.aux = AuxPin::new(self.config.aux == AuxWiring::Present);
         self.echo_expected.clear();
         self.last_rx_us = None;
+        (self.look_again_at_us, self.looks) = (0, 0);
         if let Err(error) = self.config.check() {
             self.fault(Diagnostic::Configuration(error));
             return;
@@ -204,6 +212,16 @@ impl Driver {
             self.reopen_at_us = self.now_us + back_off(&CLOSED_BACK_OFF_US, &mut self.closed_tries);
         }
         self.push_reopen();
+    }
+
+    /// Somebody wants to send, and the module said nothing when it was asked what it is: perhaps it does now.
+    fn look_again(&mut self) {
+        let was_silent = self.state == DriverState::Ready && self.facts.registers.is_none();
+        let can_ask = self.config.mode_pins != ModePins::Strapped;
+        if was_silent && can_ask && self.now_us >= self.look_again_at_us {
+            self.look_again_at_us = self.now_us + back_off(&LOOK_AGAIN_US, &mut self.looks);
+            self.begin_recovery();
+        }
     }
 
     fn stop(&mut self) {

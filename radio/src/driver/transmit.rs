@@ -58,6 +58,7 @@ impl Driver {
         if let Some(reason) = refusal {
             self.counters.tx_refused += 1;
             self.push(DriverOutput::TxFailed { id, radiated: Radiated::No, reason });
+            self.look_again();
             return;
         }
         let [high, low] = target.to_be_bytes();

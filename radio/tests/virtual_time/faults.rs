@@ -294,6 +294,30 @@ fn configuration_that_is_never_answered() {
 }
 
 #[test]
+fn a_module_that_answers_late_is_looked_at_again_when_somebody_wants_to_send() {
+    let quirks = Quirks { no_configuration: true, ..Quirks::default() };
+    let mut bench = Bench::new(software(), ModelConfig { quirks, ..ModelConfig::prepared(true) });
+    bench.bring_up(2_000_000);
+    bench.run_for(60_000_000);
+    assert_eq!(bench.driver.state(), DriverState::Ready, "nobody wants anything: nothing is said");
+    // Still silent: one look for many wishes, since each may go on the air.
+    let looks = |bench: &Bench| {
+        bench.diagnostics().iter().filter(|d| ***d == Diagnostic::SoftwareSwitchSilent).count()
+    };
+    let before = looks(&bench);
+    for id in 1..=10 {
+        assert!(bench.send(id, b"x").is_err());
+        bench.run_for(400_000);
+    }
+    assert_eq!(looks(&bench), before + 1);
+    bench.module.quirks_mut().no_configuration = false;
+    bench.run_for(6_000_000);
+    assert!(bench.send(11, b"x").is_err());
+    assert!(bench.run_to_state(DriverState::Ready, 3_000_000));
+    sends_whole(&mut bench, 12);
+}
+
+#[test]
 fn a_module_of_another_family_is_left_untouched() {
     let quirks = Quirks { device_type: Some("E220-400T30D".into()), ..Quirks::default() };
     let mut bench = Bench::new(lines(AuxWiring::Absent), with(quirks));
