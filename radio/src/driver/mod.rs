@@ -37,9 +37,12 @@ use transmit::Sending;
 const CLOSED_BACK_OFF_US: [u64; 3] = [100_000, 250_000, 500_000];
 /// Pauses before reopening a port whose module does not work; the last one repeats.
 const FAULT_BACK_OFF_US: [u64; 4] = [500_000, 1_000_000, 2_000_000, 5_000_000];
-/// Pauses between looks at a module that did not answer when it was brought up; the last one repeats. Each look begins with
+/// Pauses between looks at a module that left questions unanswered when it was brought up; the last one repeats. Each look begins with
 /// a frame that was refused: only then may something be radiated, which a command to a module without the switch is.
-const LOOK_AGAIN_US: [u64; 3] = [5_000_000, 15_000_000, 60_000_000];
+/// While it is looked at it does not hear.
+const LOOK_AGAIN_US: [u64; 4] = [5_000_000, 15_000_000, 60_000_000, 300_000_000];
+/// After so many looks a module that answers everything but AT commands is one that has none.
+const LOOKS_WITHOUT_AT: usize = 2;
 /// Received bytes held for a shell that does not drain; beyond, the oldest output is not touched and new bytes are
 /// counted as discarded.
 const UNDRAINED_BYTES: usize = 1 << 20;
@@ -214,9 +217,12 @@ impl Driver {
         self.push_reopen();
     }
 
-    /// Somebody wants to send, and the module said nothing when it was asked what it is: perhaps it does now.
+    /// Somebody wants to send, and the module did not say what it is or where it sends: perhaps it does now.
     fn look_again(&mut self) {
-        let was_silent = self.state == DriverState::Ready && self.facts.registers.is_none();
+        // Registers without AT commands are what the first generation says, too: that is believed soon.
+        let told_all = self.facts.registers.is_some()
+            && (self.facts.firmware.is_some() || self.looks >= LOOKS_WITHOUT_AT);
+        let was_silent = self.state == DriverState::Ready && !told_all;
         let can_ask = self.config.mode_pins != ModePins::Strapped;
         if was_silent && can_ask && self.now_us >= self.look_again_at_us {
             self.look_again_at_us = self.now_us + back_off(&LOOK_AGAIN_US, &mut self.looks);

@@ -48,6 +48,8 @@ pub struct Quirks {
     pub no_configuration: bool,
     /// The three header bytes count towards the sub-packet: 3 + 240 bytes leave as two packets.
     pub header_counts_towards_subpacket: bool,
+    /// AT commands are never answered, registers are: a module that is late.
+    pub silent_at: bool,
     /// `AT+UFREQ` is unknown.
     pub no_ufreq: bool,
     /// `AT+UAUX` is unknown.

@@ -100,7 +100,7 @@ impl Module {
     fn at(&mut self, command: &[u8]) {
         let bare = command.strip_suffix(b"\r\n");
         let quirks = &self.config.quirks;
-        if quirks.wants_crlf && bare.is_none() {
+        if quirks.silent_at || quirks.wants_crlf && bare.is_none() {
             return;
         }
         if quirks.rejects_crlf && bare.is_some() {

@@ -318,6 +318,18 @@ fn a_module_that_answers_late_is_looked_at_again_when_somebody_wants_to_send() {
 }
 
 #[test]
+fn a_module_whose_at_commands_come_late_is_looked_at_again_too() {
+    let quirks = Quirks { silent_at: true, ..Quirks::default() };
+    let mut bench = Bench::new(software(), ModelConfig { quirks, ..ModelConfig::prepared(true) });
+    bench.bring_up(5_000_000);
+    assert_eq!(bench.driver.facts().frequency_hz, Some(435_125_000), "by its own grid, one thinks");
+    bench.module.quirks_mut().silent_at = false;
+    assert_eq!(bench.send(1, b"x"), Err((Radiated::No, TxFailure::FrequencyUnverified)));
+    assert!(bench.run_to_state(DriverState::Ready, 5_000_000));
+    sends_whole(&mut bench, 2);
+}
+
+#[test]
 fn a_module_of_another_family_is_left_untouched() {
     let quirks = Quirks { device_type: Some("E220-400T30D".into()), ..Quirks::default() };
     let mut bench = Bench::new(lines(AuxWiring::Absent), with(quirks));

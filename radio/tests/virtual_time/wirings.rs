@@ -186,7 +186,13 @@ fn first_generation_cannot_reach_the_offset_and_does_not_send() {
     let mut bench = Bench::new(config(ModePins::Lines { inverted: false }, AuxWiring::Absent), model);
     bench.bring_up(5_000_000);
     assert_eq!(bench.driver.facts().frequency_hz, Some(435_125_000));
-    assert_eq!(bench.send(1, b"x"), Err((Radiated::No, TxFailure::FrequencyUnverified)));
+    for id in 1..=3 {
+        assert_eq!(bench.send(id, b"x"), Err((Radiated::No, TxFailure::FrequencyUnverified)));
+        assert!(bench.run_to_state(DriverState::Ready, 5_000_000));
+        bench.run_for(20_000_000);
+    }
+    // Asked twice again whether it knows more: then it is left to what it can do.
+    assert_eq!(bench.send(4, b"x"), Err((Radiated::No, TxFailure::FrequencyUnverified)));
     bench.hear_whole(b"still heard", -90);
     assert_eq!(bench.delivered.len(), 12);
 }
