@@ -390,10 +390,10 @@ where
     T: Into<On<'a>>,
 {
     sql("select at_us from (
-           select received_at_us as at_us, 0 as place, id from outside_receptions
+           select received_at_us as at_us, taken_at_us as came_us, id from outside_receptions
              where frame = ?1 and time_basis not in ('import', 'board-alone')
-           union all select received_at_us as at_us, 1 as place, id from receptions where frame = ?1) as told
-         order by place, id limit 1")
+           union all select received_at_us as at_us, received_at_us as came_us, id from receptions where frame = ?1) as told
+         order by came_us, id limit 1")
     .bind(frame)
     .scalar_optional(on)
     .await

@@ -33,6 +33,8 @@ pub(super) struct Heard {
     pub(super) repeat: bool,
     /// Its values are in the archive: somebody else's report of it came first.
     pub(super) has_values: bool,
+    /// Somebody else's report of it came first, without a time: its values are filed as the frame is.
+    pub(super) was_undated: bool,
 }
 
 /// How a frame came in.
@@ -204,6 +206,7 @@ impl Station {
             length: frame.bytes().len(),
             repeat: false,
             has_values: false,
+            was_undated: false,
         };
         self.packet(&heard, &packet);
     }
@@ -236,6 +239,7 @@ impl Station {
             length: frame.bytes().len(),
             repeat: known.is_some_and(|(_, others_first, _)| !others_first) && !how.promoted,
             has_values: known.is_some_and(|(_, others_first, has_values)| others_first && has_values),
+            was_undated: known.is_some_and(|(_, others_first, has_values)| others_first && !has_values),
         };
         let (record, reception) = rows(id, route.clone(), frame, &how, received.utc);
         if how.promoted && known.is_some() {
@@ -292,9 +296,11 @@ impl Station {
                 self.note_readings(heard, &points);
             }
             if !heard.has_values {
+                let filed =
+                    heard.was_undated.then(|| super::outside::undated(&heard.route.satellite)).flatten();
                 self.journal.push(Record::Telemetry(TelemetryRecord {
                     frame: heard.id,
-                    route: heard.route.clone(),
+                    route: filed.unwrap_or_else(|| heard.route.clone()),
                     at: heard.at.utc,
                     decoder_version: DECODER_VERSION,
                     points,

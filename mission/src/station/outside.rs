@@ -67,7 +67,7 @@ impl Station {
                 taken.merged += 1;
                 self.push_outside(now, delivered, Some(known.frame));
                 if at.1 && !known.dated {
-                    self.derive(now, s, delivered, known.frame, &frame, told);
+                    self.derive(now, s, delivered, (known.frame, false), &frame, told);
                 }
             }
             None => {
@@ -94,7 +94,7 @@ impl Station {
                     elsewhere: true,
                     dated: at.1,
                 });
-                self.derive(now, s, delivered, id, &frame, told);
+                self.derive(now, s, delivered, (id, true), &frame, told);
             }
         }
     }
@@ -115,12 +115,14 @@ impl Station {
         now: Now,
         s: usize,
         delivered: &Delivered,
-        id: FrameId,
+        (id, is_new): (FrameId, bool),
         frame: &DownFrame<'_>,
         told: &mut u32,
     ) {
         let reception = &delivered.reception;
-        let Some(route) = route(&delivered.satellite, reception) else { return };
+        let route =
+            if is_new { route(&delivered.satellite, reception) } else { undated(&delivered.satellite) };
+        let Some(route) = route else { return };
         let Some(link) = self.links.iter().position(|link| link.satellite == s) else { return };
         let heard = Heard {
             id,
@@ -133,6 +135,7 @@ impl Station {
             length: frame.bytes().len(),
             repeat: false,
             has_values: false,
+            was_undated: false,
         };
         let is_fresh = reception.is_dated() && now.utc.0.abs_diff(heard.at.utc.0) <= FRESH_US;
         let packet = frame.packet();
@@ -176,7 +179,15 @@ impl Station {
 
 /// How the rows of what others heard are filed.
 fn route(satellite: &SatelliteId, reception: &Reception) -> Option<Route> {
-    let link = if reception.is_dated() { reception.ear.name() } else { UNDATED };
+    filed(satellite, if reception.is_dated() { reception.ear.name() } else { UNDATED })
+}
+
+/// How the values of a frame are filed that came without a time, whoever told it then: as the frame itself is.
+pub(super) fn undated(satellite: &SatelliteId) -> Option<Route> {
+    filed(satellite, UNDATED)
+}
+
+fn filed(satellite: &SatelliteId, link: &str) -> Option<Route> {
     Some(Route {
         satellite: satellite.clone(),
         station: StationId::new(ELSEWHERE).ok()?,
