@@ -1,5 +1,5 @@
-//! The leases of our keys, where several servers share a database: taken when there is something to say and the satellite
-//! may be there, renewed meanwhile, given back after.
+//! The leases of our keys, where several servers share a database: taken when there is something to say that could be
+//! sent now, renewed meanwhile, given back after.
 //!
 //! The engine is told how long a lease holds by its own clock, counted from before the question: it never believes longer
 //! than the database does. Without an answer it believes nothing new, and the lease ends by itself; it is asked for again
@@ -51,10 +51,15 @@ impl Leases {
     pub(crate) async fn run(self, stop: CancellationToken) {
         let mut held: BTreeMap<KeyId, Held> = BTreeMap::new();
         let mut changes = self.engine.status_changes();
+        // Not begun anew at each change: where the status changes several times in a tick there would never be one.
+        let mut tick = Box::pin(wall_sleep(TICK));
         loop {
             let ticked = tokio::select! {
                 () = stop.cancelled() => break,
-                () = wall_sleep(TICK) => true,
+                () = &mut tick => {
+                    tick = Box::pin(wall_sleep(TICK));
+                    true
+                }
                 changed = changes.changed() => {
                     if changed.is_err() {
                         break;
@@ -134,12 +139,10 @@ pub(crate) fn waiting(key: KeyId) -> String {
     format!("waiting for the lease of key {key}")
 }
 
-/// There is something to say with this key, and it may be heard.
+/// Something could be said with this key now, or is on its way.
 fn is_wanted(status: &Status, key: KeyId) -> bool {
     let of_key =
         |satellite| status.sealing.iter().any(|sealing| sealing.key == key && sealing.satellite == satellite);
-    status.satellites.iter().filter(|sat| of_key(sat.satellite.clone())).any(|sat| {
-        let something = sat.queued > 0 || sat.outstanding.is_some() || sat.download.is_some();
-        something && sat.in_view != Some(false)
-    })
+    let mut ours = status.satellites.iter().filter(|sat| of_key(sat.satellite.clone()));
+    ours.any(|sat| sat.wants_lease || sat.outstanding.is_some())
 }

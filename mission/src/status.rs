@@ -111,6 +111,8 @@ pub struct SatelliteStatus {
     pub sky: Option<SkyStatus>,
     /// What the uplink is doing, as a short sentence: why nothing is sent, or what is awaited until when.
     pub uplink: String,
+    /// Something could be sent now but for the lease of its key, which another server may hold.
+    pub wants_lease: bool,
     /// The command that is on its way or awaits its answer.
     pub outstanding: Option<CommandId>,
     /// Commands that wait.

@@ -9,9 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
-use api::{ChunkMap, CommandView, EventView, FrameView, ImageView, StreamMessage};
+use api::{ChunkMap, CommandView, EventView, FrameView, ImageView, StationView, StreamMessage};
 use end_to_end::stream::{Follower, Look};
-use end_to_end::wait::{PATIENCE, pause, until};
+use end_to_end::wait::{PATIENCE, now, pause, until};
 use end_to_end::{Client, Folder, Server, Twin, journal};
 use migrations::cluster::{Cluster, Database};
 use protocol::{DownFrame, Downlink};
@@ -133,6 +133,10 @@ fn a_request_sent_to_both_is_taken_by_one_and_a_key_is_used_by_one_at_a_time() {
         let key = format!("race-{race}");
         if kills > 0 && race % races.div_ceil(kills) == races.div_ceil(kills) / 2 {
             let victim = random.random_range(0..2);
+            // A module whose setting up was broken off may be deaf until its power is cycled: that is not what is asked here.
+            if let Some(server) = &servers[victim] {
+                server.until_link("ok", PATIENCE);
+            }
             let racing = {
                 let (clients, key) = (clients.clone(), key.clone());
                 std::thread::spawn(move || send_to_both(&clients, &key))
@@ -156,7 +160,7 @@ fn a_request_sent_to_both_is_taken_by_one_and_a_key_is_used_by_one_at_a_time() {
         both += 1;
         // A queue has a bound.
         if both % 100 == 0 || both == races {
-            all_are_answered(&clients[0]);
+            all_are_answered(&clients);
         }
     }
     let commands: Vec<CommandView> = clients[1].all("/api/v1/commands");
@@ -187,11 +191,24 @@ fn a_request_sent_to_both_is_taken_by_one_and_a_key_is_used_by_one_at_a_time() {
 
 /// Waits until all commands of both have been sent and answered: the key goes from one to the other when there is nothing
 /// left to say, or when its lease ends with a server that was killed.
-fn all_are_answered(client: &Client) {
-    until("every command has been answered", PATIENCE * 4, || {
-        let commands: Vec<CommandView> = client.all("/api/v1/commands");
-        commands.iter().all(|command| command.stage == "answered").then_some(())
-    });
+fn all_are_answered(clients: &[Client; 2]) {
+    let began = now();
+    loop {
+        let commands: Vec<CommandView> = clients[0].all("/api/v1/commands");
+        let waiting: Vec<u64> =
+            commands.iter().filter(|command| command.stage != "answered").map(|command| command.id).collect();
+        if waiting.is_empty() {
+            return;
+        }
+        if began.elapsed() > PATIENCE * 4 {
+            let told = clients.each_ref().map(|client| {
+                let station: StationView = client.read("/api/v1/station");
+                (station.satellites[0].uplink.clone(), station.links[0].clone(), station.sealing[0].clone())
+            });
+            panic!("commands {waiting:?} are not answered: {told:#?}");
+        }
+        pause(Duration::from_millis(100));
+    }
 }
 
 /// Sends the same request to both at the same time; the command that each of them says it is.

@@ -290,8 +290,10 @@ impl Engine {
                 self.handle(Input::WitnessFailed { key, reason: &reason });
             }
             Outcome::LookedUp { intent, result } => {
-                let found = result
-                    .map_err(|error| tracing::error!("an intent cannot be looked up: {}", whole(&error)));
+                let found = result.map_err(|error| match error {
+                    StoreError::Claimed => tracing::debug!("{error}"),
+                    error => tracing::error!("an intent cannot be looked up: {}", whole(&error)),
+                });
                 if let Some(envelope) = self.intents.looked_up(intent, found) {
                     self.handle(Input::Intent(envelope));
                 }

@@ -60,6 +60,7 @@ fn satellite(name: &str, elements: u64, passes: Vec<PassAhead>) -> SatelliteStat
             passes,
         }),
         uplink: String::new(),
+        wants_lease: false,
         outstanding: None,
         queued: 0,
         image: None,

@@ -63,11 +63,17 @@ impl Station {
         self.licence_gate(now, link.config.timing.uplink_us())?;
         self.blackout_gate(now, link.config.timing.uplink_us())?;
         self.seal_gate(sat)?;
-        lease_gate(sat, now)?;
         link_gate(link, now, need.gate)?;
         contact_gate(sat, now, need.gate)?;
         silence_gate(sat, link, now)?;
-        los_gate(sat, link, now, need.answer_us)
+        los_gate(sat, link, now, need.answer_us)?;
+        // Last: who could send nothing anyhow must not keep the key from others.
+        lease_gate(sat, now)
+    }
+
+    /// Only the lease of the key is missing.
+    pub(super) fn is_for_lease(&self, now: Now, s: usize, wait: &Wait) -> bool {
+        self.satellites.get(s).is_some_and(|sat| lease_gate(sat, now).is_err_and(|lease| lease == *wait))
     }
 
     /// The licence covers the whole transmission.

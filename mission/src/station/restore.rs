@@ -153,6 +153,7 @@ fn satellite(
         readings: BTreeMap::new(),
         sky: Sky::restore(left),
         note: "starting".to_owned(),
+        wants_lease: false,
         wake: None,
     }
 }

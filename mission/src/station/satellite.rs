@@ -203,6 +203,8 @@ pub(super) struct Satellite {
     pub(super) sky: Sky,
     /// What the uplink is doing, for people.
     pub(super) note: String,
+    /// Everything but the lease of its key lets something be sent now.
+    pub(super) wants_lease: bool,
     /// When the uplink wants to be looked at again.
     pub(super) wake: Option<MonoUs>,
 }

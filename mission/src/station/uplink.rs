@@ -75,6 +75,7 @@ impl Station {
 
     /// Takes the next command in hand, if the gate is open.
     fn begin(&mut self, now: Now, s: usize) -> bool {
+        self.satellites[s].wants_lease = false;
         if let Some(wait) = self.raise_witness_again(now, s) {
             self.satellites[s].note = wait;
             return false;
@@ -99,6 +100,7 @@ impl Station {
                     if let Some(at) = wait.until {
                         self.satellites[s].wake_at(at);
                     }
+                    self.satellites[s].wants_lease |= self.is_for_lease(now, s, &wait);
                     first_wait.get_or_insert(wait);
                     // What was sealed already goes first, or nothing does.
                     if self.satellites[s].commands.get(&id).is_some_and(|c| c.stage == Stage::Sealed) {
@@ -115,6 +117,7 @@ impl Station {
                     if let Some(at) = wait.until {
                         self.satellites[s].wake_at(at);
                     }
+                    self.satellites[s].wants_lease = self.is_for_lease(now, s, &wait);
                     first_wait = Some(wait);
                 }
             }

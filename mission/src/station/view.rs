@@ -64,6 +64,7 @@ impl Station {
             expectation: sat.expectation(now),
             sky: sat.sky.status(now.utc),
             uplink: sat.note.clone(),
+            wants_lease: sat.wants_lease,
             outstanding: sat.outstanding(),
             queued: sat.queue().len(),
             image: sat.image.as_ref().map(|image| ImageStatus {

@@ -1,6 +1,6 @@
 //! Listen first: when the uplink may be used, and how long an answer is awaited.
 
-use mission::{Gate, Input, Intent, LinkState, MaybeRadiated, Refusal, Stage};
+use mission::{Gate, Input, Intent, Lease, LinkState, MaybeRadiated, Refusal, Stage};
 use protocol::{Resolution, Telecommand};
 use radio::airtime::LinkTiming;
 
@@ -21,6 +21,28 @@ fn nothing_is_sent_to_a_satellite_that_was_not_heard_unless_blind_is_wanted() {
     assert!(world.transmits.is_empty());
     let blind = blind(&mut world, Telecommand::Ping);
     assert_eq!((world.stage(blind), world.stage(heard)), (Stage::Radiating, Stage::Queued));
+}
+
+/// Whoever could send nothing anyhow must not keep the key from others.
+#[test]
+fn the_lease_of_a_key_is_wanted_when_nothing_else_is_missing() {
+    let mut world = World::new(Setup::default());
+    world.link_state(LinkState::Ok);
+    let key = world.key();
+    let why = "key is used by station b".to_owned();
+    world.handle(Input::Lease { key, lease: Lease::NotOurs { why: why.clone() } });
+    world.command(Telecommand::Ping);
+    world.pass(10 * S);
+    let wants = |world: &World| world.station.status(world.now).satellites[0].wants_lease;
+    assert!(!wants(&world), "{}", world.note());
+    world.heartbeat();
+    world.pass(10 * S);
+    assert!(wants(&world), "{}", world.note());
+    assert_eq!(world.note(), why);
+    world
+        .handle(Input::Lease { key, lease: Lease::Ours { until: world.now.mono.plus(30 * S), spent: None } });
+    assert_eq!(world.transmits.len(), 1);
+    assert!(!wants(&world), "it is on its way");
 }
 
 #[test]
