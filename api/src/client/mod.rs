@@ -1,4 +1,5 @@
-//! A typed client of the API: one method for each operation, and the [stream](EventStream) that comes back by itself.
+//! A typed client of the API: one method for each operation of reading, commanding, downloads, elements, plans and
+//! runs, and the [stream](EventStream) that comes back by itself.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), api::client::ClientError> {

@@ -1,4 +1,4 @@
-//! One method for each operation.
+//! One method for each operation of reading, commanding, downloads, elements, plans and runs.
 
 use super::{
     ACCEPT, Client, ClientError, Duration, Filter, HeaderMap, HeaderValue, IF_NONE_MATCH, IdempotencyKey,

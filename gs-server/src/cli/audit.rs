@@ -34,7 +34,7 @@ struct Of {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  gs-server audit list --data /var/lib/pixelsat --limit 50
+  gs-server audit list --data /var/lib/pixelsat-ground --limit 50
 
 Oldest first. The server may be running.")]
 pub struct List {
@@ -49,8 +49,8 @@ pub struct List {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  gs-server audit verify --data /var/lib/pixelsat
-  gs-server audit verify --data /var/lib/pixelsat --head 1290:5f2c…
+  gs-server audit verify --data /var/lib/pixelsat-ground
+  gs-server audit verify --data /var/lib/pixelsat-ground --head 1290:5f2c…
 
 Each row is tied to the one before it by a hash. What is printed at the end is the head: write it down
 elsewhere now and then. Given later with --head, it proves that nothing up to that row was made anew.

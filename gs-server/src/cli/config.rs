@@ -17,7 +17,7 @@ pub enum Config {
     #[command(after_help = "\
 Examples:
   gs-server config check station.toml
-  gs-server config check --config /etc/pixelsat/station.toml --json
+  gs-server config check --config /etc/pixelsat-ground/station.toml --json
 
 No secret is printed. Key files are looked at as `serve` would. Exit code 2 for a mistake in the
 file, 3 for a key file that would be refused.")]

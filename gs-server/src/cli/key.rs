@@ -28,7 +28,7 @@ pub enum Key {
     #[command(after_help = "\
 Examples:
   gs-server key new                              a file in this folder, named by the key's id
-  gs-server key new /etc/pixelsat/uplink.key
+  gs-server key new /etc/pixelsat-ground/uplink.key
   gs-server key new twin.key --simulated --json
 
 The key itself is never printed: copy the file to whoever loads it into the satellite. What is
@@ -37,7 +37,7 @@ printed is its id, by which everything else names it. An existing file is never 
     /// List key files: id, mark, and whether the server would take them
     #[command(after_help = "\
 Examples:
-  gs-server key list /etc/pixelsat
+  gs-server key list /etc/pixelsat-ground
   gs-server key list a.key b.key --json
 
 Exit code 3 if a file named on the command line would be refused.")]

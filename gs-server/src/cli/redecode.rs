@@ -16,7 +16,7 @@ use crate::storage::{Store, StoreError, StoreOptions};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  gs-server redecode --data /var/lib/pixelsat
+  gs-server redecode --data /var/lib/pixelsat-ground
 
 Reads every raw frame again and makes the values from it as this version of the program does.
 Raw frames are never touched. No server may run on the folder meanwhile. Broken off, it goes on

@@ -19,7 +19,7 @@ use crate::storage::StoreError;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  gs-server serve --config /etc/pixelsat/station.toml
+  gs-server serve --config /etc/pixelsat-ground/station.toml
   gs-server serve --config station.toml --listen 127.0.0.1:0 --json
 
 One line goes to standard output when the API listens, the log to standard error. SIGTERM and
