@@ -3,7 +3,7 @@
 //! Watchers that fall behind lose their place (`RecvError::Lagged`) and read what they missed from storage by its
 //! sequence; nothing is lost, and nobody waits for them.
 //!
-//! Who only needs to know *that* something is new has a [bell](Hub::bell).
+//! Who only needs to know *that* something is new has a bell (`Hub::bell`).
 
 use std::sync::{Arc, Mutex, PoisonError};
 
