@@ -15,6 +15,9 @@ use crate::ingest::formats::{self, Context, Format, Item, RECEPTION_MAX};
 use crate::ingest::{EarsError, Outcome};
 use crate::storage::{OutsideQuery, OutsideRow};
 
+/// What a reception may be.
+const KINDS: [&str; 4] = ["frame", "repairable", "damaged", "detection"];
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Asked {
@@ -33,6 +36,16 @@ pub(super) async fn list(
     State(app): State<App>,
     Query(asked): Query<Asked>,
 ) -> Result<Json<Page<OutsideView>>, Failure> {
+    let wrong = |field, words: &str| {
+        let message = format!("{field}: must be one of {words}");
+        Err(Failure::field(ProblemKind::BadParameter, field, message))
+    };
+    if asked.source.as_deref().is_some_and(|source| Ear::from_name(source).is_none()) {
+        return wrong("source", &Ear::ALL.map(Ear::name).join(", "));
+    }
+    if asked.kind.as_deref().is_some_and(|kind| !KINDS.contains(&kind)) {
+        return wrong("kind", &KINDS.join(", "));
+    }
     let query = OutsideQuery {
         satellite: asked.satellite,
         source: asked.source,
