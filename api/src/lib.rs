@@ -37,6 +37,7 @@ mod command;
 mod download;
 mod elements;
 mod event;
+mod forward;
 mod frame;
 mod image;
 #[cfg(feature = "openapi")]
@@ -67,6 +68,7 @@ pub use elements::{
     SourceWord,
 };
 pub use event::{AuditView, EventView, LimitView};
+pub use forward::{ForwardRequest, ForwardTargetView, ForwardView, ForwardWhole};
 pub use frame::{FieldView, FrameView, PacketView, ReceptionView};
 pub use image::{ChunkMap, ImageView};
 pub use page::{Nothing, Page};
@@ -112,8 +114,9 @@ pub use version::{Health, Version};
 pub const API_VERSION: u32 = 1;
 
 /// What this version can do; a client asks for a capability by name, never by version number.
-pub const CAPABILITIES: [&str; 10] = [
+pub const CAPABILITIES: [&str; 11] = [
     "alerts",
+    "forwards",
     "archive",
     "commands",
     "downloads",

@@ -39,6 +39,7 @@ pub mod decode;
 pub mod demo;
 pub mod elements;
 pub mod engine;
+pub mod forward;
 pub mod hamlib;
 pub mod http;
 pub mod hub;

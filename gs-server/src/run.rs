@@ -29,6 +29,7 @@ use crate::config::{Changes, Config, TwoPerson, station_config};
 use crate::elements::task::ElementsTask;
 use crate::elements::{Door, ElementsHandle, Fetcher, Wanted};
 use crate::engine::{Engine, EngineHandle, EngineParts, LinkPort, OsEntropy};
+use crate::forward::{self, ForwardParts};
 use crate::hamlib::{self, AntennaTask};
 use crate::http::{self, AllowedHosts, HttpState, Identity, RadioOnAir, Tls, TlsFiles, Token};
 use crate::hub::Hub;
@@ -217,6 +218,10 @@ pub async fn run_with(
     })?;
     alerts_task.spawn(&api);
     reports(&config, &identity, &store, &timer, &hub, &api);
+    let forwards = forward::spawn(
+        &ForwardParts { config: &config, store: &store, timer: &timer, alerts: Some(&alerts) },
+        &api,
+    );
     let ears = Ears::new(store.clone(), inbox.clone(), Arc::clone(&timer));
     let aliases = Aliases::of(&config);
     let state = HttpState {
@@ -224,6 +229,7 @@ pub async fn run_with(
         aliases,
         elements,
         alerts,
+        forwards,
         store: store.clone(),
         engine: handle.clone(),
         hub: hub.clone(),

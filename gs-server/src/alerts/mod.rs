@@ -19,7 +19,7 @@ mod gather;
 mod handle;
 mod message;
 mod outbox;
-mod target;
+pub(crate) mod target;
 mod task;
 mod view;
 

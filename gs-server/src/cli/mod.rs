@@ -15,6 +15,7 @@ mod downlink;
 mod elements;
 mod failure;
 mod fit;
+mod forward;
 mod hold;
 mod import;
 mod key;
@@ -122,6 +123,9 @@ pub enum Command {
     /// Alerts: what is wrong, who knows of it, who is told
     #[command(subcommand, visible_alias = "alerts")]
     Alert(alert::Alert),
+    /// What is passed on to SatNOGS DB and others, and how it stands
+    #[command(subcommand)]
+    Forward(forward::Forward),
     /// What a pass brought, what the next shift must know, what a month came to
     #[command(subcommand)]
     Report(report::Report),
@@ -192,6 +196,7 @@ impl Cli {
             Command::Openapi(openapi) => openapi.run(),
             Command::Radio(radio) => radio.run(),
             Command::Alert(alert) => alert.run(),
+            Command::Forward(forward) => forward.run(),
             Command::Rotator(rotator) => rotator.run(),
             Command::Rig(rig) => rig.run(),
             Command::Elements(elements) => elements.run(),

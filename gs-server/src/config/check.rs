@@ -89,6 +89,7 @@ impl Config {
         self.check_ops()?;
         self.check_people()?;
         self.alerts.check()?;
+        self.check_forward()?;
         self.rotator.as_ref().map_or(Ok(()), super::RotatorSection::check)?;
         self.rig.as_ref().map_or(Ok(()), super::RigSection::check)?;
         self.check_simulated()

@@ -29,6 +29,7 @@ mod check;
 mod elements;
 mod environment;
 mod error;
+mod forward;
 mod links;
 mod ops;
 mod reload;
@@ -52,6 +53,7 @@ pub use elements::{ElementsSection, FetchSource, MIN_AGE_LEAST_H};
 pub use environment::Environment;
 pub(crate) use environment::secret as environment_secret;
 pub use error::ConfigError;
+pub use forward::{ForwardKind, ForwardSection};
 pub use links::{AuxInput, LinkKind, LinkSection, ModePinWiring, Phy, UsbId};
 pub use ops::{BackupSection, DiskSection, RetentionSection};
 pub use reload::Changes;
@@ -83,6 +85,9 @@ pub struct Config {
     /// What is an alert, and who is told.
     #[serde(default)]
     pub alerts: AlertsSection,
+    /// Who else gets what we hear; nobody by default.
+    #[serde(default)]
+    pub forward: Vec<ForwardSection>,
     /// The antenna's rotator, when there is one.
     #[serde(default)]
     pub rotator: Option<RotatorSection>,
@@ -164,7 +169,8 @@ impl Config {
         let backup = self.backup.as_mut().map(|backup| &mut backup.folder);
         let tls = self.http.tls.iter_mut().flat_map(|tls| [&mut tls.certificate, &mut tls.key]);
         let secrets = self.alerts.targets.iter_mut().filter_map(|target| target.secret_file.as_mut());
-        let others = others.chain(secrets);
+        let forwards = self.forward.iter_mut().filter_map(|target| target.secret_file.as_mut());
+        let others = others.chain(secrets).chain(forwards);
         for path in keys.chain(files).chain(others).chain(logins).chain(backup).chain(tls).chain(password) {
             if path.is_relative() {
                 *path = base.join(&*path);

@@ -34,6 +34,7 @@ impl Changes {
         note(old.disk != new.disk, "disk");
         note(old.retention != new.retention, "retention");
         note(old.alerts != new.alerts, "alerts");
+        note(old.forward != new.forward, "forward");
         note(old.reports != new.reports, "reports");
         note(old.simulation != new.simulation, "simulation");
         note(old.log.json != new.log.json, "log.json");

@@ -73,6 +73,10 @@ impl fmt::Display for Config {
         for target in &self.alerts.targets {
             writeln!(f, "alerts to {}: {}", target.name, target.shown())?;
         }
+        for target in &self.forward {
+            let live = if target.live { "" } else { ", dry run" };
+            writeln!(f, "frames to {}: {}{live}", target.name, target.shown())?;
+        }
         for source in &self.elements.fetch {
             writeln!(
                 f,

@@ -21,6 +21,7 @@ mod downloads;
 mod elements;
 mod events;
 mod extract;
+mod forwards;
 mod frames;
 mod guard;
 mod hosts;
@@ -71,6 +72,7 @@ use crate::alerts::AlertsHandle;
 use crate::clock::Timer;
 use crate::elements::ElementsHandle;
 use crate::engine::EngineHandle;
+use crate::forward::ForwardsHandle;
 use crate::hamlib::AntennaHandle;
 use crate::hub::Hub;
 use crate::ingest::{Aliases, Ears};
@@ -100,6 +102,8 @@ pub struct HttpState {
     pub ears: Ears,
     /// What our satellites are called elsewhere.
     pub aliases: Aliases,
+    /// What is passed on to others.
+    pub forwards: ForwardsHandle,
     /// Committed events as they come.
     pub hub: Hub,
     /// Rotator and rig, as far as there are any.

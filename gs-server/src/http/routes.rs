@@ -11,9 +11,9 @@ use super::admit::Policy::{Anyone, LoggedIn, Needs};
 use super::admit::{Policy, admit};
 use super::write::{guard_door, guard_write};
 use super::{
-    App, alerts, antenna, approvals, clock, commands, downloads, elements, events, frames, images, keys,
-    links, metrics, openapi, page, people, plans, receptions, rehearsals, reports, runs, schedule, session,
-    sky, station, status, stream, telemetry,
+    App, alerts, antenna, approvals, clock, commands, downloads, elements, events, forwards, frames, images,
+    keys, links, metrics, openapi, page, people, plans, receptions, rehearsals, reports, runs, schedule,
+    session, sky, station, status, stream, telemetry,
 };
 use crate::people::Right::{Approve, Command, Look, ManagePeople, ManageStation, Plan};
 
@@ -168,6 +168,12 @@ pub(super) fn table() -> Vec<Route> {
         write("/api/v1/alerts/{id}/shelve", Needs(Command), alerts::shelve),
         write("/api/v1/alerts/{id}/unshelve", Needs(Command), alerts::unshelve),
         write("/api/v1/alerts/{id}/assign", Needs(Command), alerts::assign),
+        read("/api/v1/forwards", Needs(Look), forwards::list),
+        read("/api/v1/forwards/targets", Needs(Look), forwards::targets),
+        write("/api/v1/forwards/targets/{name}/pause", Needs(Command), forwards::pause),
+        write("/api/v1/forwards/targets/{name}/resume", Needs(Command), forwards::resume),
+        read("/api/v1/forwards/{id}", Needs(Look), forwards::get),
+        write("/api/v1/forwards/{id}/retry", Needs(Command), forwards::retry),
         read("/api/v1/events", Needs(Look), events::list),
         read("/api/v1/limits", Needs(Look), events::limits),
         read("/api/v1/audit", Needs(Look), events::audit),

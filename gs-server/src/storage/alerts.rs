@@ -270,7 +270,7 @@ impl Store {
     }
 
     /// The numbers that this station gives.
-    fn own(&self) -> Own {
+    pub(super) fn own(&self) -> Own {
         Own::of(self.0.number)
     }
 

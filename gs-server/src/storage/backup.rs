@@ -3,12 +3,13 @@
 use std::path::Path;
 use std::time::Duration;
 
-use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqliteSynchronous};
 use sqlx::{Connection as _, SqliteConnection};
 
-use super::db::sql;
+use super::db::{Connection, sql};
+use super::forwards::ForwardRow;
 use super::lite::schema_crc;
-use super::row::{Row as _, select};
+use super::row::{Row as _, select, upsert};
 use super::rows::MetaRow;
 use super::{DATABASE, StoreError};
 
@@ -42,6 +43,31 @@ pub async fn copy_database(folder: &Path, to: &Path) -> Result<(), StoreError> {
     let target = to.to_str().ok_or_else(|| StoreError::Permission { path: to.to_path_buf() })?;
     sqlx::query("vacuum into ?").bind(target).persistent(false).execute(&mut connection).await?;
     Ok(connection.close().await?)
+}
+
+/// What waited to be passed on when the backup was taken may have gone out since: it is as if the server had died while it
+/// was on its way. The file must be nobody's.
+///
+/// # Errors
+/// [`StoreError`] when it cannot be read or written.
+pub async fn doubt_forwards(file: &Path) -> Result<(), StoreError> {
+    let options = SqliteConnectOptions::new()
+        .filename(file)
+        .journal_mode(SqliteJournalMode::Delete)
+        .synchronous(SqliteSynchronous::Full);
+    let mut connection = Connection::Lite(SqliteConnection::connect_with(&options).await?);
+    let known = "select count(*) from sqlite_schema where type = 'table' and name = 'forwards'";
+    let known: i64 = sql(known).scalar(&mut connection).await?;
+    if known > 0 {
+        sql("begin immediate").execute(&mut connection).await?;
+        let waiting = sql(select::<ForwardRow>("where state = 'waiting'")).fetch_all(&mut connection).await?;
+        for row in &waiting {
+            let row = ForwardRow { state: "sending".to_owned(), ..ForwardRow::read(row)? };
+            row.bind(sql(upsert::<ForwardRow>("id"))).execute(&mut connection).await?;
+        }
+        sql("commit").execute(&mut connection).await?;
+    }
+    connection.close().await
 }
 
 /// Looks at a database that nobody writes: are its pages whole, its tables ours, and what does it say of itself.

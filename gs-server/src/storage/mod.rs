@@ -23,6 +23,7 @@ mod convert_sky;
 mod db;
 mod ears;
 mod error;
+mod forwards;
 mod inspect;
 mod lite;
 mod lock;
@@ -56,10 +57,13 @@ pub use alerts::{
     AlertBatch, AlertProgress, AlertQuery, AlertRow, Delivery, DeliveryRow, DeliveryState, FinalRun,
 };
 pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
-pub use backup::{DatabaseFacts, copy_database, examine_database};
+pub use backup::{DatabaseFacts, copy_database, doubt_forwards, examine_database};
 pub use ears::{OutsideQuery, OutsideRow};
 pub use error::StoreError;
 pub(crate) use error::utc;
+pub use forwards::{
+    ForwardCounts, ForwardQuery, ForwardRow, ForwardState, ForwardSubject, ForwardTargetRow, ForwardWish,
+};
 pub use inspect::{Inspection, inspect_database};
 pub(crate) use people::PeopleChange;
 pub use people::{ApprovalRow, LinkRow, SessionRow, StationLicenceRow, TokenRow, TransmissionRow, UserRow};

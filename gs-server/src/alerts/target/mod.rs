@@ -6,8 +6,8 @@ mod chat;
 mod email;
 mod matrix;
 mod request;
-mod secret;
-mod webhook;
+pub(crate) mod secret;
+pub(crate) mod webhook;
 
 use std::fmt;
 use std::time::Duration;
@@ -97,7 +97,7 @@ impl Target {
             kind: section.kind,
             shown: section.shown(),
             way,
-            secret: SecretSource::of(section),
+            secret: SecretSource::of(section.secret_file.as_ref(), section.secret_env.as_ref()),
         })
     }
 

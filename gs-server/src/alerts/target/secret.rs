@@ -8,21 +8,21 @@ use std::path::{Path, PathBuf};
 use rustix::fs::OFlags;
 use zeroize::Zeroizing;
 
-use crate::config::{TargetSection, environment_secret};
+use crate::config::environment_secret;
 
 /// Longer files are none.
 const FILE_MAX: u64 = 4096;
 
 /// Where a secret stands.
 #[derive(Debug, Clone)]
-pub(super) enum SecretSource {
+pub(crate) enum SecretSource {
     File(PathBuf),
     Environment(String),
 }
 
 /// Why there is none. Names the remedy, never the content.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum SecretError {
+pub(crate) enum SecretError {
     #[error("secret file {} cannot be read ({source})", path.display())]
     Read { path: PathBuf, source: io::Error },
     #[error("secret file {} may be read by others or belongs to somebody else: run `chmod 600` and `chown` on it", .0.display())]
@@ -34,12 +34,12 @@ pub(super) enum SecretError {
 }
 
 impl SecretSource {
-    pub(super) fn of(section: &TargetSection) -> Option<Self> {
-        let file = section.secret_file.clone().map(Self::File);
-        file.or_else(|| section.secret_env.clone().map(Self::Environment))
+    pub(crate) fn of(file: Option<&PathBuf>, variable: Option<&String>) -> Option<Self> {
+        let file = file.cloned().map(Self::File);
+        file.or_else(|| variable.cloned().map(Self::Environment))
     }
 
-    pub(super) async fn load(&self) -> Result<Zeroizing<String>, SecretError> {
+    pub(crate) async fn load(&self) -> Result<Zeroizing<String>, SecretError> {
         match self {
             Self::Environment(name) => environment_secret(name)
                 .map(|secret| Zeroizing::new(secret.trim().to_owned()))

@@ -30,7 +30,7 @@ pub(super) async fn send(url: &Url, letter: &Letter, secret: &str) -> Result<(),
 }
 
 /// `v1,` and the HMAC-SHA256 of `id.timestamp.body` in base64. A secret that begins with `whsec_` is base64 itself.
-fn sign(secret: &str, id: &str, seconds: &str, body: &[u8]) -> Result<String, SendError> {
+pub(crate) fn sign(secret: &str, id: &str, seconds: &str, body: &[u8]) -> Result<String, SendError> {
     let key = match secret.strip_prefix("whsec_") {
         Some(encoded) => STANDARD.decode(encoded).map_err(|_| {
             SendError::Secret("the secret begins with whsec_ and is not base64 after it".into())

@@ -3,6 +3,7 @@
 //! The document is a snapshot in `docs/openapi.json`, served at `/api/v1/openapi.json`, printed by `gs-server openapi`.
 
 mod alerts;
+mod forwards;
 mod operation;
 mod people;
 mod table;

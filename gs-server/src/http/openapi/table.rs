@@ -53,6 +53,7 @@ pub(in crate::http) fn table() -> Vec<Doc> {
     rows.extend(sky());
     rows.extend(plans());
     rows.extend(super::alerts::alerts());
+    rows.extend(super::forwards::forwards());
     rows.extend(super::people::rehearsals());
     rows.extend(super::people::people());
     rows

@@ -9,7 +9,7 @@ use super::super::openapi::document;
 use super::{Answer, Bench, TOKEN, heartbeat, image_info, request};
 
 /// The lists, and the field that says when.
-const LISTS: [(&str, &str); 18] = [
+const LISTS: [(&str, &str); 19] = [
     ("frames", "heard_at"),
     ("receptions", "received_at"),
     ("commands", "created_at"),
@@ -21,6 +21,7 @@ const LISTS: [(&str, &str); 18] = [
     ("rehearsals", "asked_at"),
     ("runs", "aos"),
     ("alerts", "raised_at"),
+    ("forwards", "received_at"),
     ("events", "at"),
     ("limits", "since"),
     ("audit", "at"),
@@ -30,7 +31,8 @@ const LISTS: [(&str, &str); 18] = [
     ("tokens", "created_at"),
 ];
 /// What is no record of a moment: it is how things stand.
-const TIMELESS: [&str; 5] = ["ears", "parameters", "telemetry/latest", "elements/sources", "alerts/targets"];
+const TIMELESS: [&str; 6] =
+    ["ears", "parameters", "telemetry/latest", "elements/sources", "alerts/targets", "forwards/targets"];
 
 #[test]
 fn every_list_of_the_document_takes_start_and_stop() {

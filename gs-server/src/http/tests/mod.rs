@@ -3,6 +3,7 @@
 mod alerts;
 mod client;
 mod elements;
+mod forwards;
 mod hostile;
 mod lists;
 mod openapi;
@@ -166,6 +167,15 @@ impl Bench {
             ears: crate::ingest::Ears::new(store.clone(), inbox.clone(), Arc::clone(&timer)),
             aliases: crate::ingest::Aliases::default(),
             alerts: alerts.clone(),
+            forwards: crate::forward::spawn(
+                &crate::forward::ForwardParts {
+                    config: &config,
+                    store: &store,
+                    timer: &timer,
+                    alerts: Some(&alerts),
+                },
+                &crate::lifecycle::Lifecycle::new(&stop),
+            ),
             elements: ElementsHandle::without_sources(wanted, Arc::clone(&timer)),
             store: store.clone(),
             engine: handle,

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::{BackupError, Manifest, failed, make_folder, own_file, sync_folder, verify};
-use crate::storage::DATABASE;
+use crate::storage::{DATABASE, doubt_forwards};
 use crate::witness::WitnessFolder;
 
 /// Puts `backup` into `folder`, which is made, or empty. The folder becomes a data folder with its last step; before, a
@@ -37,6 +37,7 @@ async fn fill(backup: &Path, folder: &Path) -> Result<Manifest, BackupError> {
     let incoming = folder.join(INCOMING);
     let opened = verify::open(backup, &incoming).await?;
     let manifest = opened.manifest;
+    doubt_forwards(&incoming).await?;
     // First the mark, then the archive.
     let path = folder.join("witness");
     let witness = WitnessFolder::open(&path).map_err(failed(&path, "cannot be made"))?;

@@ -24,6 +24,7 @@ mod bulk;
 mod conformance;
 mod damage;
 mod folder;
+mod forwards;
 mod full;
 mod kill;
 mod plans;
