@@ -2,7 +2,7 @@
 # Installs what a clean Debian or Ubuntu machine lacks, and nothing that is there already.
 #
 #   scripts/setup.sh compiler                what scripts/demo needs
-#   scripts/setup.sh compiler python node tools cargo-tools     what scripts/test needs (also: scripts/setup.sh all)
+#   scripts/setup.sh compiler python node tools package cargo-tools     what scripts/test needs (also: scripts/setup.sh all)
 #
 # Rust is presupposed; everything else is named here, each package where it is needed.
 set -euo pipefail
@@ -11,6 +11,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # Versions that were tried with our toolchain; a newer one may want a newer Rust.
 NEXTEST_VERSION=0.9.151
 DENY_VERSION=0.20.2
+DEB_VERSION=3.8.0
 CRYPTOGRAPHY_VERSION=46
 SGP4_VERSION=2.27
 SKYFIELD_VERSION=1.55
@@ -97,11 +98,23 @@ tools() {
   { have rotctld && have rigctld; } || install_packages libhamlib-utils
 }
 
-# install_cargo_tool CRATE VERSION: builds it when it is not in the path. Its artefacts stay out of our target folder.
+# install_cargo_tool CRATE VERSION [OPTION...]: builds it when it is not in the path. Its artefacts stay out of our target folder.
 install_cargo_tool() {
-  have "$1" && return
-  say "building $1 $2 once (some minutes)"
-  env -u CARGO_TARGET_DIR -u RUSTFLAGS cargo install --quiet --locked "$1@$2" >&2 || fail "cargo could not install $1 $2"
+  local crate=$1 version=$2
+  shift 2
+  have "$crate" && return
+  say "building $crate $version once (some minutes)"
+  env -u CARGO_TARGET_DIR -u RUSTFLAGS cargo install --quiet --locked "$@" "$crate@$version" >&2 || fail "cargo could not install $crate $version"
+}
+
+# scripts/package and scripts/package-check make the Debian package, and ask systemd what it thinks of the unit: the package
+# systemd is needed for its systemd-analyze alone, nothing is started.
+package() {
+  rust
+  PATH="$PATH:${CARGO_INSTALL_ROOT:-${CARGO_HOME:-$HOME/.cargo}}/bin"
+  have dpkg-deb || install_packages dpkg
+  have systemd-analyze || install_packages systemd
+  install_cargo_tool cargo-deb "$DEB_VERSION" --no-default-features
 }
 
 cargo_tools() {
@@ -120,8 +133,9 @@ for need in "$@"; do
     python) python ;;
     node) javascript ;;
     tools) tools ;;
+    package) package ;;
     cargo-tools) cargo_tools ;;
-    all) compiler; python; javascript; tools; cargo_tools ;;
-    *) fail "unknown need '$need': compiler, python, node, tools, cargo-tools or all" ;;
+    all) compiler; python; javascript; tools; package; cargo_tools ;;
+    *) fail "unknown need '$need': compiler, python, node, tools, package, cargo-tools or all" ;;
   esac
 done

@@ -99,7 +99,8 @@ pub use sky::{
     RefusedElements, SkyGapView,
 };
 pub use station::{
-    ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView, StationView, StorageView,
+    CounterConfirmation, ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView,
+    StationView, StorageView,
 };
 pub use stream::{StreamMessage, StreamRequest, StreamValue, Topic, UnknownTopic};
 pub use summary::{

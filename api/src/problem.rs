@@ -185,6 +185,8 @@ kinds! {
     NotLocked 409 "not-locked" "Nothing is locked";
     /// The clock leads above forgotten counters, and nobody vouches for it.
     ClockNotVouched 409 "clock-not-vouched" "Nobody says that the clock is right";
+    /// Counters of a sequence were forgotten, and nobody says above which to go on.
+    FloorNeeded 409 "floor-needed" "Nobody says above which counter to go on";
     /// No plan has this name.
     UnknownPlan 404 "unknown-plan" "There is no such plan";
     /// The plan is wrong; the message says where and what to do.

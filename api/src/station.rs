@@ -164,6 +164,17 @@ pub struct SealingView {
     pub locked: Option<String>,
 }
 
+/// An operator knows why counter and witness of a key disagree.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CounterConfirmation {
+    /// Go on above this counter, besides all that are known. A key with `counter = "sequence"` needs it after a restore, or
+    /// when its witness was lost.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub above: Option<u64>,
+}
+
 /// Storage now.
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]

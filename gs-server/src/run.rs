@@ -46,7 +46,7 @@ use crate::report::ReportTask;
 use crate::storage::{Store, StoreError};
 
 use archive::images_elsewhere;
-pub(crate) use archive::{clock_for, newest_event, not_yet_stored, open_store, snapshot};
+pub(crate) use archive::{clock_for, newest_event, not_yet_stored, open_store, postgres, snapshot};
 pub use error::RunError;
 pub use options::{Ready, Report, RunOptions, SetLogFilter};
 

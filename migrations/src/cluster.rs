@@ -184,6 +184,24 @@ impl Database {
         )
     }
 
+    /// Changes a row of the audit as somebody would who has the database and not our program.
+    ///
+    /// # Errors
+    /// What the server said against it.
+    pub fn tamper_with_the_audit(&self, row: i64) -> io::Result<()> {
+        let change =
+            format!("set session_replication_role = replica; update audit set who = 'eve' where id = {row}");
+        self.tell(&change).map(drop)
+    }
+
+    /// Says that a program with a newer schema was here.
+    ///
+    /// # Errors
+    /// What the server said against it.
+    pub fn pretend_a_newer_schema(&self) -> io::Result<()> {
+        self.tell("update _sqlx_migrations set version = 999 where version = 1").map(drop)
+    }
+
     /// Chunks of an image that are held more than once, as `image|index` lines.
     ///
     /// # Errors

@@ -8,6 +8,8 @@
 
 #[cfg(feature = "cluster")]
 pub mod cluster;
+#[cfg(feature = "cluster")]
+pub mod tables;
 
 use sqlx::migrate::Migrator;
 

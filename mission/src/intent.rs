@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use protocol::{KeyId, Telecommand};
+use protocol::{Counter, KeyId, Telecommand};
 
 use crate::clock::UtcUs;
 use crate::id::{CommandId, DownloadId, IntentId, LinkId, PlanName, Principal, SatelliteId};
@@ -44,7 +44,12 @@ pub enum Intent {
     /// I have looked: the clock of this machine is right. Holds until the process ends.
     VouchClock,
     /// I know why counter and witness disagree: go on above the higher of them.
-    ConfirmCounter(KeyId),
+    ConfirmCounter {
+        /// Of which key.
+        key: KeyId,
+        /// And above this one. Needed where counters were forgotten that no clock leads above.
+        above: Option<Counter>,
+    },
     /// Use these elements from now on, where they are the best for an instant. Sets that are held already are skipped.
     AddElements {
         /// Whose.
@@ -204,6 +209,27 @@ pub enum Refusal {
          synchronise it, or look at it and vouch for it, then confirm again"
     )]
     ClockNotVouched(KeyId),
+    /// Counters were forgotten, this key counts them one by one, and nobody says above which to go on.
+    #[error(
+        "key {key} counts its frames one by one, and counters may have been used that this station has forgotten (it knows of {known}): \
+         say above which to go on (`gs-server key confirm --above N`; `above` in the API). Ask the satellite for the last \
+         counter it took, or look in the records of whoever commanded it; if nobody knows, be generous: {known} + 1000000 costs nothing, a \
+         counter that is used twice gives the key away"
+    )]
+    FloorNeeded {
+        /// Which key.
+        key: KeyId,
+        /// The highest that is known; 0 for none.
+        known: Counter,
+    },
+    /// The number is none to go on above.
+    #[error("above: {above} is {}", if above < known { format!("below counter {known}, which is known to be used") } else { "so high that no counter is left".to_owned() })]
+    FloorOutOfRange {
+        /// What was given.
+        above: Counter,
+        /// The highest that is known; 0 for none.
+        known: Counter,
+    },
     /// No such plan.
     #[error("plan: there is no plan '{0}'")]
     UnknownPlan(String),

@@ -13,6 +13,9 @@ use end_to_end::terminal::Terminals;
 use end_to_end::wait::until;
 use serde_json::json;
 
+/// The schema before reports and what others heard: whatever the walk leaves in the archive fits into it.
+const OLD_SCHEMA: usize = 6;
+
 /// A pass takes half a minute here; the machine may be busy.
 const LIMIT: Duration = Duration::from_secs(240);
 
@@ -126,8 +129,29 @@ fn a_newcomer_gets_through_the_first_week_by_the_page_alone() {
     newcomer.does(first);
     newcomer.terminals.prelude = guide.prelude.clone();
     assert!(rest.len() > 25, "{} steps", rest.len());
+    // Reader and test have one program; so that the upgrade is one, the archive is made an older program's before it.
+    let archive = home.path().join("ground/ground-data/ground.sqlite3");
+    let newest = migrations::newest_sqlite();
+    let (mut upgraded, mut migrated) = (false, false);
     for step in rest {
         eprintln!("{step}");
+        let is_new_program = matches!(&step.what, What::Run(commands) if commands.starts_with("install "));
+        if is_new_program {
+            migrations::tables::age(&archive, OLD_SCHEMA).expect("an older archive");
+            assert_eq!(migrations::tables::schema(&archive).expect("a schema"), OLD_SCHEMA as i64);
+        }
         newcomer.does(step);
+        if is_new_program {
+            upgraded = true;
+        } else if upgraded && matches!(&step.what, What::Window(name, _) if name == "server") {
+            let says = format!("the archive is brought from schema {OLD_SCHEMA} to {newest}");
+            assert!(newcomer.terminals.shown("server").contains(&says), "{says}");
+            assert_eq!(migrations::tables::schema(&archive).expect("a schema"), newest);
+            upgraded = false;
+        } else if matches!(&step.what, What::Run(commands) if commands.contains("after-upgrade.tar")) {
+            assert!(newcomer.said.contains(&format!("schema {newest}")), "{}", newcomer.said);
+            migrated = true;
+        }
     }
+    assert!(migrated, "the page has no upgrade any more");
 }

@@ -5,11 +5,11 @@ use super::{
     Method, StatusCode, bytes, segment,
 };
 use crate::{
-    AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, DownloadRequest,
-    DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView, Health,
-    HeldElements, ImageView, LatestValue, LimitView, LookList, Nothing, Outcome, Page, ParameterView,
-    PassKept, PassList, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, TelemetryPage,
-    Time, Version,
+    AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, CounterConfirmation,
+    DownloadRequest, DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport,
+    FrameView, Health, HeldElements, ImageView, LatestValue, LimitView, LookList, Nothing, Outcome, Page,
+    ParameterView, PassKept, PassList, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView,
+    TelemetryPage, Time, Version,
 };
 
 /// A fetch asks several sources one after the other.
@@ -166,11 +166,23 @@ verbs! {
     hold(&str) = "satellites/*/hold";
     /// Gives it back.
     release(&str) = "satellites/*/release";
-    /// I know why counter and witness of this key disagree.
-    confirm_counter(&str) = "keys/*/confirm-counter";
 }
 
 impl Client {
+    /// I know why counter and witness of this key disagree; with `above`, sealing goes on above that counter.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn confirm_counter(
+        &self,
+        of: &str,
+        above: Option<u64>,
+        key: &IdempotencyKey,
+    ) -> Result<Outcome, ClientError> {
+        let path = format!("keys/{}/confirm-counter", segment(of));
+        self.post(&path, &CounterConfirmation { above }, key).await
+    }
+
     /// Whether the server can do its work; an answer also when it cannot.
     ///
     /// # Errors

@@ -1,10 +1,9 @@
 //! `gs-server audit list|verify`.
 
-use std::path::PathBuf;
-
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
+use super::archive::OfArchive;
 use super::plans::minute;
 use super::shell::{print_json, print_line, runtime};
 use super::{Exit, Failure};
@@ -19,12 +18,11 @@ pub enum Audit {
     Verify(Verify),
 }
 
-/// The data folder that is meant.
+/// The archive that is meant.
 #[derive(Debug, Args)]
 struct Of {
-    /// The data folder of a station
-    #[arg(long, value_name = "DIR", env = "GS_DATA", hide_env_values = true)]
-    data: PathBuf,
+    #[command(flatten)]
+    archive: OfArchive,
     /// JSON on standard output
     #[arg(long)]
     json: bool,
@@ -33,10 +31,12 @@ struct Of {
 /// `gs-server audit list`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Example:
+Examples:
   gs-server audit list --data /var/lib/pixelsat-ground --limit 50
+  gs-server audit list --config /etc/pixelsat-ground/station.toml
 
-Oldest first. The server may be running.")]
+Oldest first. The server may be running. An archive in PostgreSQL is named by --config; it has one
+audit for all its stations.")]
 pub struct List {
     #[command(flatten)]
     of: Of,
@@ -50,11 +50,13 @@ pub struct List {
 #[command(after_help = "\
 Examples:
   gs-server audit verify --data /var/lib/pixelsat-ground
+  gs-server audit verify --config /etc/pixelsat-ground/station.toml
   gs-server audit verify --data /var/lib/pixelsat-ground --head 1290:5f2c…
 
 Each row is tied to the one before it by a hash. What is printed at the end is the head: write it down
 elsewhere now and then. Given later with --head, it proves that nothing up to that row was made anew.
-The server may be running. Exit code 1 when anything is wrong.")]
+The server may be running. An archive in PostgreSQL is named by --config. Exit code 1 when anything
+is wrong.")]
 pub struct Verify {
     #[command(flatten)]
     of: Of,
@@ -97,7 +99,9 @@ impl Audit {
 
 impl List {
     fn run(self) -> Result<Exit, Failure> {
-        let rows = runtime()?.block_on(read_audit(&self.of.data, self.limit)).map_err(Failure::failed)?;
+        let rows = runtime()?
+            .block_on(read_audit(&self.of.archive.archive()?, self.limit))
+            .map_err(Failure::failed)?;
         if self.of.json {
             print_json(&Listed { audit: rows.into_iter().map(line).collect() })?;
             return Ok(Exit::Done);
@@ -120,8 +124,9 @@ fn line(row: AuditRow) -> Line {
 
 impl Verify {
     fn run(self) -> Result<Exit, Failure> {
-        let verdict =
-            runtime()?.block_on(verify_audit(&self.of.data, &self.head)).map_err(Failure::failed)?;
+        let verdict = runtime()?
+            .block_on(verify_audit(&self.of.archive.archive()?, &self.head))
+            .map_err(Failure::failed)?;
         let exit = if verdict.wrong == 0 { Exit::Done } else { Exit::Failed };
         let head = verdict.head.map(|head| head.to_string());
         if self.of.json {

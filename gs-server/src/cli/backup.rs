@@ -26,7 +26,8 @@ Examples:
 The server may run and write meanwhile. In the file: the database as it is at one moment, the
 witness, the configuration, a manifest with SHA-256 of each. Keys and the token are never in it.
 The file appears whole or not at all; one that has its name stays whole until then. Exit code 3
-if another backup to the same name is under way. For PostgreSQL use pg_dump."
+if another backup to the same name is under way, or if the archive is a PostgreSQL: that is backed
+up with pg_dump (docs/storage.md)."
 )]
 pub struct Backup {
     #[command(subcommand)]
@@ -117,6 +118,9 @@ impl Backup {
 
 fn take(target: &Path, of: &Of, with_keys: Option<&Path>, json: bool) -> Result<Exit, Failure> {
     let config = of.config.as_deref().map(Config::load).transpose().map_err(Failure::usage)?;
+    if let Some(database) = config.as_ref().and_then(|config| config.storage.database.clone()) {
+        return Err(failure(BackupError::Postgres(database)));
+    }
     let folder = match (&of.data, &config) {
         (Some(data), _) => data.clone(),
         (None, Some(config)) => config.storage.folder.clone(),

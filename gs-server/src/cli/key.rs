@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use api::{Nothing, SealingView, StationView};
+use api::{CounterConfirmation, SealingView, StationView};
 use clap::{Args, Subcommand};
 use protocol::KeyId;
 use serde::Serialize;
@@ -47,9 +47,13 @@ Exit code 3 if a file named on the command line would be refused.")]
 Examples:
   gs-server key confirm --config station.toml
   gs-server key confirm --config station.toml 374708ff
+  gs-server key confirm --config station.toml 374708ff --above 1048576
 
 Asked of the running server. Find out first why it is locked (`gs-server doctor` and the page say so), and
 see that the clock is right: sealing goes on above the clock and above every counter that is known.
+A key whose counter is a sequence has no clock to go on above: after a restore, or when the witness was
+lost, it needs --above with the highest counter that may have been used. The satellite knows the last
+one it took; if nobody does, add a generous margin to what is known.
 Exit code 3 when the server refuses.")]
     Confirm(Confirm),
 }
@@ -90,6 +94,9 @@ pub struct Confirm {
     /// The id of the key; not needed where the station has one key
     #[arg(value_name = "KEY")]
     key: Option<KeyId>,
+    /// Go on above this counter, too
+    #[arg(long, value_name = "N")]
+    above: Option<u64>,
     /// One JSON object on standard output: how it stands with sealing
     #[arg(long)]
     json: bool,
@@ -117,8 +124,10 @@ impl Key {
 impl Confirm {
     fn run(self) -> Result<Exit, Failure> {
         let remote = server(&self.of.load()?)?;
-        let (key, sealing) =
-            runtime()?.block_on(confirm(&remote, self.key)).map_err(failure)?.map_err(Failure::usage)?;
+        let (key, sealing) = runtime()?
+            .block_on(confirm(&remote, self.key, self.above))
+            .map_err(failure)?
+            .map_err(Failure::usage)?;
         if let Some(why) = sealing.as_ref().and_then(|sealing| sealing.locked.as_ref()) {
             return Err(Failure::refused(format!("key {key} is confirmed, and still locked: {why}")));
         }
@@ -134,6 +143,7 @@ impl Confirm {
 async fn confirm(
     remote: &Remote,
     key: Option<KeyId>,
+    above: Option<u64>,
 ) -> Result<Result<(String, Option<SealingView>), String>, RemoteError> {
     let key = match key {
         Some(key) => key.to_string(),
@@ -142,7 +152,7 @@ async fn confirm(
             Err(why) => return Ok(Err(why)),
         },
     };
-    remote.write(&format!("keys/{key}/confirm-counter"), &Nothing {}).await?;
+    remote.write(&format!("keys/{key}/confirm-counter"), &CounterConfirmation { above }).await?;
     let mut looks = 0;
     loop {
         let station: StationView = remote.get("station", &[]).await?;

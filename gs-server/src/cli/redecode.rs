@@ -1,30 +1,32 @@
 //! `gs-server redecode`.
 
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use super::archive::OfArchive;
 use super::serve::is_refusal;
 use super::shell::{print_json, print_line, runtime};
 use super::{Exit, Failure};
-use crate::storage::{Store, StoreError, StoreOptions};
+use crate::storage::{DATABASE, Store, StoreError, StoreOptions};
 
 /// `gs-server redecode`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Example:
+Examples:
   gs-server redecode --data /var/lib/pixelsat-ground
+  gs-server redecode --config /etc/pixelsat-ground/station.toml
 
 Reads every raw frame again and makes the values from it as this version of the program does.
 Raw frames are never touched. No server may run on the folder meanwhile. Broken off, it goes on
-where it was. Exit code 1 if rows were found damaged, 3 if the folder is in use.")]
+where it was. With --config an archive in PostgreSQL is read, too, with the frames of all its
+stations; the server of this one must be stopped, others may run and wait for it now and then.
+Exit code 1 if rows were found damaged, 3 if the folder or the station is in use.")]
 pub struct Redecode {
-    /// The data folder of a station
-    #[arg(long, value_name = "DIR", env = "GS_DATA", hide_env_values = true)]
-    data: PathBuf,
+    #[command(flatten)]
+    of: OfArchive,
     /// One JSON object at the end
     #[arg(long)]
     json: bool,
@@ -94,18 +96,19 @@ impl Redecode {
     }
 
     async fn open(&self) -> Result<Store, Failure> {
-        if !self.data.join("ground.sqlite3").is_file() {
+        let archive = self.of.archive()?;
+        if archive.postgres.is_none() && !archive.folder.join(DATABASE).is_file() {
             return Err(Failure::usage(format!(
-                "{} is no data folder: there is no ground.sqlite3",
-                self.data.display()
+                "{} is no data folder: there is no ground.sqlite3. An archive in PostgreSQL is named by --config",
+                archive.folder.display()
             )));
         }
         let options = |simulated| StoreOptions {
-            folder: self.data.clone(),
+            folder: archive.folder.clone(),
             station: None,
             simulated,
             max_page_count: None,
-            postgres: None,
+            postgres: archive.postgres.clone(),
             reserve_bytes: 0,
         };
         let opened = match Store::open(options(false)).await {
@@ -113,8 +116,9 @@ impl Redecode {
             Err(StoreError::SimulatedMark { simulated, .. }) => Store::open(options(simulated)).await,
             opened => opened,
         };
-        opened.map_err(
-            |error| if is_refusal(&error) { Failure::refused(error) } else { Failure::failed(error) },
-        )
+        opened.map_err(|error| {
+            let refused = is_refusal(&error) || matches!(error, StoreError::StationTaken);
+            if refused { Failure::refused(error) } else { Failure::failed(error) }
+        })
     }
 }

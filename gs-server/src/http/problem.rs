@@ -141,6 +141,8 @@ impl From<Refusal> for Failure {
             Refusal::Storage(_) => (ProblemKind::StorageFailing, None),
             Refusal::NotLocked(_) => (ProblemKind::NotLocked, None),
             Refusal::ClockNotVouched(_) => (ProblemKind::ClockNotVouched, None),
+            Refusal::FloorNeeded { .. } => (ProblemKind::FloorNeeded, Some("above")),
+            Refusal::FloorOutOfRange { .. } => (ProblemKind::BadArgument, Some("above")),
             Refusal::UnknownPlan(_) => (ProblemKind::UnknownPlan, Some("plan")),
             Refusal::Plan(_) => (ProblemKind::PlanRefused, Some("plan")),
             Refusal::PlansFull(_) => (ProblemKind::PlansFull, None),

@@ -96,7 +96,7 @@ pub(crate) fn not_yet_stored(
 }
 
 /// The shared database of the configuration, with its password.
-fn postgres(config: &Config) -> Result<Option<Postgres>, RunError> {
+pub(crate) fn postgres(config: &Config) -> Result<Option<Postgres>, RunError> {
     let Some(url) = &config.storage.database else { return Ok(None) };
     // The address was checked with the configuration.
     let postgres = Postgres::new(url).map_err(|problem| {

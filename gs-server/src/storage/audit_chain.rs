@@ -7,6 +7,7 @@
 //!
 //! Where several stations share a database they have one chain: a row is numbered and tied while nobody else writes.
 
+use std::collections::VecDeque;
 use std::fmt;
 use std::fs::OpenOptions;
 use std::io::{self, Read as _, Write as _};
@@ -15,14 +16,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Mutex;
 
-use futures_util::TryStreamExt as _;
 use sha2::{Digest as _, Sha256};
-use sqlx::{Connection as _, SqliteConnection};
 
 use super::db::{Connection, DbRow, sql};
 use super::row::{Row as _, select};
 use super::rows::{AuditLinkRow, AuditRow};
-use super::{DATABASE, StoreError, lite};
+use super::{Archive, StoreError};
 
 /// The file with the newest head, in the data folder.
 const HEAD_FILE: &str = "audit-head";
@@ -30,6 +29,8 @@ const HEAD_FILE: &str = "audit-head";
 const HEAD_BYTES_MAX: u64 = 256;
 /// What the first row of a chain is tied to.
 const BEGINNING: [u8; 32] = [0; 32];
+/// Rows that are in memory at once.
+const ROWS_AT_ONCE: i64 = 2_000;
 /// Findings that are told in full.
 const FINDINGS_MAX: usize = 20;
 
@@ -129,32 +130,35 @@ pub(super) async fn begin(connection: &mut Connection) -> Result<(), StoreError>
     Ok(())
 }
 
-/// Looks at the whole chain in this data folder, beside a server that may be running, and changes nothing. `noted` are
-/// heads that somebody wrote down.
+/// Looks at the whole chain of this archive, beside servers that may be running, and changes nothing. `noted` are
+/// heads that somebody wrote down; the one in the data folder counts as well.
 ///
 /// # Errors
 /// [`StoreError`] when there is no database or it cannot be read. What is wrong inside is a finding, not an error.
-pub async fn verify_audit(folder: &Path, noted: &[AuditHead]) -> Result<AuditVerdict, StoreError> {
-    let mut connection = reading(folder).await?;
+pub async fn verify_audit(archive: &Archive, noted: &[AuditHead]) -> Result<AuditVerdict, StoreError> {
+    let mut connection = archive.reading().await?;
     let mut verdict = AuditVerdict::default();
     let mut heads: Vec<(AuditHead, String)> =
         noted.iter().map(|head| (*head, "the head that was given".to_owned())).collect();
-    match HeadFile::new(folder).read() {
+    match HeadFile::new(&archive.folder).read() {
         Ok(Some(head)) => heads.push((head, format!("the file {HEAD_FILE}"))),
         Ok(None) => {}
         Err(why) => verdict.found(format!("the file {HEAD_FILE} is not what was written: {why}")),
     }
 
-    let mut rows = sqlx::query(
-        "select a.id, a.station, a.at_us, a.who, a.action, a.detail, a.crc, l.hash as link
-         from audit a left join audit_links l on l.audit = a.id order by a.id",
-    )
-    .fetch(&mut connection);
     let (mut last, mut before) = (0_i64, BEGINNING);
     let mut met = vec![false; heads.len()];
-    while let Some(row) = rows.try_next().await? {
-        let row = DbRow::from(row);
+    let mut rows = VecDeque::new();
+    let mut from = Some(i64::MIN);
+    loop {
+        if rows.is_empty()
+            && let Some(first) = from
+        {
+            rows = tied_rows(&mut connection, first).await?;
+        }
+        let Some(row) = rows.pop_front() else { break };
         let id: i64 = row.try_get("id")?;
+        from = id.checked_add(1);
         if id != last + 1 {
             verdict.found(format!("row {} is missing: after row {last} comes row {id}", last + 1));
         }
@@ -190,7 +194,6 @@ pub async fn verify_audit(folder: &Path, noted: &[AuditHead]) -> Result<AuditVer
             }
         }
     }
-    drop(rows);
     for ((head, name), met) in heads.iter().zip(met) {
         if !met {
             verdict.found(format!("{name} ends at row {}, which is not there: rows were cut off", head.row));
@@ -206,12 +209,12 @@ pub async fn verify_audit(folder: &Path, noted: &[AuditHead]) -> Result<AuditVer
     Ok(verdict)
 }
 
-/// The newest rows of the audit in this data folder, oldest first, beside a server that may be running.
+/// The newest rows of the audit of this archive, oldest first, beside servers that may be running.
 ///
 /// # Errors
 /// As [`verify_audit`]; a row that is not what was written is an error here.
-pub async fn read_audit(folder: &Path, limit: u32) -> Result<Vec<AuditRow>, StoreError> {
-    let mut connection = reading(folder).await?;
+pub async fn read_audit(archive: &Archive, limit: u32) -> Result<Vec<AuditRow>, StoreError> {
+    let mut connection = archive.reading().await?;
     let rows = sql(select::<AuditRow>("order by id desc limit ?"))
         .bind(i64::from(limit))
         .fetch_all(&mut connection)
@@ -220,13 +223,15 @@ pub async fn read_audit(folder: &Path, limit: u32) -> Result<Vec<AuditRow>, Stor
     rows.iter().rev().map(AuditRow::read).collect()
 }
 
-async fn reading(folder: &Path) -> Result<SqliteConnection, StoreError> {
-    let path = folder.join(DATABASE);
-    if !path.is_file() {
-        let missing = io::Error::new(io::ErrorKind::NotFound, "there is no database in this folder");
-        return Err(StoreError::from_io(&path, missing));
-    }
-    Ok(SqliteConnection::connect_with(&lite::reader_of(folder)).await?)
+/// The next rows and what ties them, from this one on.
+async fn tied_rows(connection: &mut Connection, from: i64) -> Result<VecDeque<DbRow>, StoreError> {
+    let rows = sql("select a.id, a.station, a.at_us, a.who, a.action, a.detail, a.crc, l.hash as link
+         from audit a left join audit_links l on l.audit = a.id where a.id >= ? order by a.id limit ?")
+    .bind(from)
+    .bind(ROWS_AT_ONCE)
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into())
 }
 
 /// The file with the newest head. It is written after the commit, off the loop, and may lag behind by a row when the

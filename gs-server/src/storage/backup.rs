@@ -8,15 +8,14 @@ use sqlx::{Connection as _, SqliteConnection};
 
 use super::db::{Connection, sql};
 use super::forwards::ForwardRow;
-use super::lite::schema_crc;
 use super::row::{Row as _, select, upsert};
 use super::rows::MetaRow;
-use super::{DATABASE, StoreError};
+use super::{DATABASE, StoreError, lite, pg};
 
 /// What a database says of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DatabaseFacts {
-    /// Whose it is.
+    /// Whose it is; of a database that stations share, who made it.
     pub station: String,
     /// What it holds is made up.
     pub simulated: bool,
@@ -76,7 +75,7 @@ pub async fn doubt_forwards(file: &Path) -> Result<(), StoreError> {
 /// [`StoreError::Damaged`] when anything is not as this program makes it.
 pub async fn examine_database(file: &Path) -> Result<DatabaseFacts, StoreError> {
     let options = SqliteConnectOptions::new().filename(file).read_only(true).immutable(true);
-    let mut connection = SqliteConnection::connect_with(&options).await?;
+    let mut connection = Connection::Lite(SqliteConnection::connect_with(&options).await?);
     let facts = facts(&mut connection).await?;
     let finding: String = sql("pragma quick_check(1)").scalar(&mut connection).await?;
     if finding != "ok" {
@@ -86,10 +85,14 @@ pub async fn examine_database(file: &Path) -> Result<DatabaseFacts, StoreError> 
     Ok(facts)
 }
 
-pub(super) async fn facts(connection: &mut SqliteConnection) -> Result<DatabaseFacts, StoreError> {
+pub(super) async fn facts(connection: &mut Connection) -> Result<DatabaseFacts, StoreError> {
     let meta = sql(select::<MetaRow>("where id = 1")).fetch_one(&mut *connection).await?;
     let meta = MetaRow::read(&meta)?;
-    if meta.schema_crc != schema_crc(connection).await? {
+    let schema_crc = match connection {
+        Connection::Lite(connection) => lite::schema_crc(connection).await?,
+        Connection::Pg(connection) => pg::schema_crc(connection).await?,
+    };
+    if meta.schema_crc != schema_crc {
         return Err(StoreError::damaged("its tables are not those that this program made"));
     }
     let schema = sql("select max(version) from _sqlx_migrations").scalar(&mut *connection).await?;

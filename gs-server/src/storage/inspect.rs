@@ -1,19 +1,15 @@
-//! Looking at the database of a data folder from outside, while a server may be writing: for `gs-server doctor`.
+//! Looking at an archive from outside, while servers may be writing: for `gs-server doctor`.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::time::Duration;
 
 use protocol::{Counter, KeyId};
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{Connection as _, SqliteConnection};
 
 use super::backup::{DatabaseFacts, facts};
 use super::convert::narrow;
-use super::db::sql;
+use super::db::{Connection, sql};
 use super::row::{Row, select};
 use super::rows::{CommandRow, EventRow, FrameRow, SealedRow, StageRow};
-use super::{DATABASE, StoreError};
+use super::{Archive, StoreError};
 
 /// What was seen of a database.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,31 +22,28 @@ pub struct Inspection {
     pub epochs_us: BTreeMap<String, i64>,
     /// Rows whose checksum was looked at.
     pub rows_checked: usize,
-    /// Version of SQLite.
-    pub sqlite: String,
+    /// Which database, and its version.
+    pub engine: String,
 }
 
 /// Looks at the pages, at the newest rows of the tables that commanding rests on, and at what they say.
 ///
 /// # Errors
 /// [`StoreError::Damaged`] when anything is not as this program makes it.
-pub async fn inspect_database(folder: &Path) -> Result<Inspection, StoreError> {
-    let options = SqliteConnectOptions::new()
-        .filename(folder.join(DATABASE))
-        .create_if_missing(false)
-        .busy_timeout(Duration::from_secs(10))
-        .pragma("query_only", "on");
-    let mut connection = SqliteConnection::connect_with(&options).await?;
+pub async fn inspect_database(archive: &Archive) -> Result<Inspection, StoreError> {
+    let mut connection = archive.reading().await?;
     let inspection = inspect(&mut connection).await;
     connection.close().await?;
     inspection
 }
 
-async fn inspect(connection: &mut SqliteConnection) -> Result<Inspection, StoreError> {
+async fn inspect(connection: &mut Connection) -> Result<Inspection, StoreError> {
     let facts = facts(connection).await?;
-    let finding: String = sql("pragma quick_check(1)").scalar(&mut *connection).await?;
-    if finding != "ok" {
-        return Err(StoreError::damaged(finding.trim().replace('\n', "; ")));
+    if let Connection::Lite(connection) = connection {
+        let finding: String = sql("pragma quick_check(1)").scalar(connection).await?;
+        if finding != "ok" {
+            return Err(StoreError::damaged(finding.trim().replace('\n', "; ")));
+        }
     }
     let rows_checked = newest::<FrameRow>(connection, "order by id desc limit 500").await?
         + newest::<SealedRow>(connection, "order by counter desc limit 500").await?
@@ -59,7 +52,7 @@ async fn inspect(connection: &mut SqliteConnection) -> Result<Inspection, StoreE
         + newest::<EventRow>(connection, "order by seq desc limit 500").await?;
     let rows = sql("select key, max(counter) as counter from (
            select key, counter from sealed_frames union all select key, counter from counter_floors)
-         group by key");
+         as spent group by key");
     let mut counters = BTreeMap::new();
     for row in rows.fetch_all(&mut *connection).await? {
         let key: String = row.try_get("key")?;
@@ -71,11 +64,15 @@ async fn inspect(connection: &mut SqliteConnection) -> Result<Inspection, StoreE
     for row in rows.fetch_all(&mut *connection).await? {
         epochs_us.insert(row.try_get("satellite")?, row.try_get("epoch_us")?);
     }
-    let sqlite = sql("select sqlite_version()").scalar(connection).await?;
-    Ok(Inspection { facts, counters, epochs_us, rows_checked, sqlite })
+    let (name, version) = match connection {
+        Connection::Lite(_) => ("SQLite", "select sqlite_version()"),
+        Connection::Pg(_) => ("PostgreSQL", "select current_setting('server_version')"),
+    };
+    let engine = format!("{name} {}", sql(version).scalar::<String>(connection).await?);
+    Ok(Inspection { facts, counters, epochs_us, rows_checked, engine })
 }
 
-async fn newest<R: Row>(connection: &mut SqliteConnection, which: &'static str) -> Result<usize, StoreError> {
+async fn newest<R: Row>(connection: &mut Connection, which: &'static str) -> Result<usize, StoreError> {
     let rows = sql(select::<R>(which)).fetch_all(connection).await?;
     rows.iter().try_for_each(|row| R::read(row).map(drop))?;
     Ok(rows.len())

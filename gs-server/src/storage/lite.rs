@@ -11,7 +11,7 @@ use sqlx::{AssertSqlSafe, Connection as _, SqliteConnection};
 
 use super::audit_chain;
 use super::db::{Connection, Pool};
-use super::open::{check_mark, mark, meta};
+use super::open::{check_mark, mark, meta, tell_upgrade};
 use super::row::{Digest, Feed as _};
 use super::write::{Target, Writer};
 use super::{DATABASE, StoreError, StoreOptions};
@@ -123,7 +123,10 @@ async fn refuse_newer(connection: &mut SqliteConnection) -> Result<(), StoreErro
     let known = migrations::newest_sqlite();
     match found {
         Some(found) if found > known => Err(StoreError::NewerSchema { found, known }),
-        _ => Ok(()),
+        found => {
+            tell_upgrade(found, known);
+            Ok(())
+        }
     }
 }
 

@@ -17,6 +17,7 @@
 mod alerts;
 mod audit_chain;
 mod backup;
+mod beside;
 mod convert;
 mod convert_plan;
 mod convert_sky;
@@ -58,6 +59,7 @@ pub use alerts::{
 };
 pub use audit_chain::{AuditHead, AuditVerdict, read_audit, verify_audit};
 pub use backup::{DatabaseFacts, copy_database, doubt_forwards, examine_database};
+pub use beside::Archive;
 pub use ears::{OutsideQuery, OutsideRow};
 pub use error::StoreError;
 pub(crate) use error::utc;
@@ -67,7 +69,7 @@ pub use forwards::{
 pub use inspect::{Inspection, inspect_database};
 pub(crate) use people::PeopleChange;
 pub use people::{ApprovalRow, LinkRow, SessionRow, StationLicenceRow, TokenRow, TransmissionRow, UserRow};
-pub use pg::{Leased, Others, Postgres};
+pub use pg::{Leased, Others, Postgres, ServerFacts, look_at_server};
 pub use read::{
     Bucket, ChunkCame, ChunkState, CommandLife, CommandNow, CommandQuery, CommandThen, Counts, During,
     EventCount, EventQuery, FrameCount, FrameQuery, Heard, HeardCounts, ImageBytes, ImageMap, LatestValue,

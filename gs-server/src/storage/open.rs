@@ -91,6 +91,13 @@ pub(super) async fn meta(on: impl Into<On<'_>>) -> Result<Option<MetaRow>, Store
     row.as_ref().map(MetaRow::read).transpose()
 }
 
+/// Tells that an older program's archive gets the steps of the schema that it lacks.
+pub(super) fn tell_upgrade(found: Option<i64>, known: i64) {
+    if let Some(found) = found.filter(|found| *found < known) {
+        tracing::info!(found, known, "the archive is brought from schema {found} to {known}");
+    }
+}
+
 /// The tables must be what we made, and the database of the kind we want.
 pub(super) fn check_mark(
     meta: &MetaRow,

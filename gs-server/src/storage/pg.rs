@@ -9,6 +9,7 @@
 
 mod lease;
 mod listen;
+mod look;
 mod password;
 mod schema;
 
@@ -30,7 +31,7 @@ use crate::clock::within;
 pub(super) use lease::Fence;
 pub use lease::Leased;
 pub use listen::Others;
-#[cfg(test)]
+pub use look::{ServerFacts, look_at_server};
 pub(super) use schema::schema_crc;
 
 /// Until a connection stands.
@@ -40,6 +41,9 @@ pub(super) const APPLY: Duration = Duration::from_secs(20);
 
 /// Of `pg_advisory_lock`: nobody else opens or migrates.
 const OPENING: i64 = 0x5047_0000_0000;
+/// What the session of a writer asks for.
+const WRITING: [(&str, &str); 1] = [("synchronous_commit", "on")];
+
 /// The station with this number (added) is at work.
 const AT_WORK: i64 = 0x5047_0001_0000;
 
@@ -88,6 +92,12 @@ impl Postgres {
     /// The address.
     pub fn url(&self) -> &str {
         &self.url
+    }
+
+    /// A connection for whoever looks at the archive beside its servers, and writes nothing.
+    pub(super) async fn connect_to_read(&self) -> Result<PgConnection, StoreError> {
+        let read_only = [("default_transaction_read_only", "on"), ("statement_timeout", "60s")];
+        connect(&self.options("gs-server look", &read_only)?).await
     }
 
     fn options(&self, name: &str, own: &[(&str, &str)]) -> Result<PgConnectOptions, StoreError> {
@@ -205,7 +215,7 @@ pub(super) async fn open(
     options: &StoreOptions,
     postgres: &Postgres,
 ) -> Result<(Writer, Pool, i64), StoreError> {
-    let writing = postgres.options("gs-server writer", &[("synchronous_commit", "on")])?;
+    let writing = postgres.options("gs-server writer", &WRITING)?;
     let mut connection = connect(&writing).await?;
     check_settings(&mut connection).await?;
     // Opening and migrating is done by one server at a time.

@@ -60,23 +60,26 @@ impl Station {
                 self.event(now.utc, EventKind::Sealing, Level::Normal, About::default(), message);
                 Ok(Accepted::Done)
             }
-            Intent::ConfirmCounter(key) => {
+            Intent::ConfirmCounter { key, above } => {
                 let s = self
                     .satellites
                     .iter()
                     .position(|sat| sat.sealer.as_ref().is_some_and(|sealer| sealer.id == key))
                     .ok_or(Refusal::UnknownKey(key))?;
-                let locked = self.satellites[s].sealer.as_ref().is_some_and(|x| x.is_locked_by_witness());
-                if !locked {
+                let vouched = self.is_vouched();
+                let Some(sealer) = self.satellites[s].sealer.as_ref() else {
+                    return Err(Refusal::UnknownKey(key));
+                };
+                if !sealer.is_locked_by_witness() {
                     return Err(Refusal::NotLocked(key));
                 }
-                let needs_clock =
-                    self.satellites[s].sealer.as_ref().is_some_and(|x| x.needs_the_clock_to_unlock());
-                if needs_clock && !self.is_vouched() {
+                if sealer.needs_the_clock_to_unlock() && !vouched {
                     return Err(Refusal::ClockNotVouched(key));
                 }
-                self.audit(now.utc, who, "key.confirm-counter", format!("key {key}"));
-                self.confirm_counter(now, s, who);
+                let floor = sealer.floor_above(now.utc, vouched, above)?;
+                let above = above.map_or_else(String::new, |above| format!(", above {above}"));
+                self.audit(now.utc, who, "key.confirm-counter", format!("key {key}{above}"));
+                self.confirm_counter(now, s, who, floor);
                 Ok(Accepted::Done)
             }
             Intent::AddElements { satellite, elements, source } => {

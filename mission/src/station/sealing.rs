@@ -5,6 +5,7 @@ use protocol::{Counter, Key, KeyId};
 use super::journal::Ticket;
 use crate::clock::UtcUs;
 use crate::config::CounterRule;
+use crate::intent::Refusal;
 use crate::port::Lease;
 use crate::snapshot::{KeySnapshot, Witness};
 
@@ -31,6 +32,10 @@ pub(super) enum Lock {
         "this archive was restored from a backup and does not know the counters that were radiated since. See that the clock is right, then confirm the counter to go on above it"
     )]
     Restored,
+    #[error(
+        "this archive was restored from a backup and does not know the counters that were radiated since (it knows of {known}), and this key counts them one by one. Find out the last one (the satellite may tell), then confirm the counter with a number that is not below it"
+    )]
+    RestoredSequence { known: u64 },
     #[error("the witness could not be raised: {0}")]
     WitnessStuck(String),
     #[error("no counter was used yet and nobody vouches for the clock: synchronise it, or vouch for it")]
@@ -91,7 +96,11 @@ impl Sealer {
             }
             (_, Witness::Restored(witness)) => {
                 sealer.witness = witness;
-                sealer.lock = Some(Lock::Restored);
+                let known = database.max(witness).unwrap_or(Counter(0)).0;
+                sealer.lock = Some(match rule {
+                    CounterRule::Time => Lock::Restored,
+                    CounterRule::Sequence => Lock::RestoredSequence { known },
+                });
             }
             (_, Witness::Damaged(why)) => sealer.lock = Some(Lock::WitnessDamaged(why)),
             (database, Witness::At(witness)) => {
@@ -193,6 +202,40 @@ impl Sealer {
         self.last.max(self.witness).max(clock).unwrap_or(Counter(0)).min(COUNTER_MAX)
     }
 
+    /// Above this an operator lets us go on who gave this number, or none.
+    pub(super) fn floor_above(
+        &self,
+        utc: UtcUs,
+        vouched: bool,
+        above: Option<Counter>,
+    ) -> Result<Counter, Refusal> {
+        let floor = self.floor(utc, vouched);
+        let known = self.last.max(self.witness).unwrap_or(Counter(0));
+        match above {
+            None if self.has_forgotten_a_sequence() => Err(Refusal::FloorNeeded { key: self.id, known }),
+            None => Ok(floor),
+            Some(above) if above < known || above >= COUNTER_MAX => {
+                Err(Refusal::FloorOutOfRange { above, known })
+            }
+            Some(above) => Ok(floor.max(above)),
+        }
+    }
+
+    /// Counters may have been used that neither database nor witness tells of, and no clock leads above them. A witness
+    /// that is whole has seen all of them.
+    fn has_forgotten_a_sequence(&self) -> bool {
+        self.rule == CounterRule::Sequence
+            && matches!(
+                self.lock,
+                Some(
+                    Lock::Restored
+                        | Lock::RestoredSequence { .. }
+                        | Lock::WitnessMissing { .. }
+                        | Lock::WitnessDamaged(_)
+                )
+            )
+    }
+
     /// Whether this counter is the newest one, so that a frame sealed with it may still go out.
     pub(super) fn is_newest(&self, counter: Counter) -> bool {
         self.last == Some(counter)
@@ -200,7 +243,7 @@ impl Sealer {
 
     /// The database is behind what was radiated, or may be: what happened in between is lost.
     pub(super) fn database_went_back(&self) -> bool {
-        matches!(self.lock, Some(Lock::WitnessAhead { .. } | Lock::Restored))
+        matches!(self.lock, Some(Lock::WitnessAhead { .. } | Lock::Restored | Lock::RestoredSequence { .. }))
     }
 
     /// Only a clock that is right leads above counters that nobody remembers.
@@ -250,9 +293,44 @@ mod tests {
             let known = database.map(Counter).max(witness).unwrap_or(Counter(0));
             assert_eq!(locked.floor(NOW, false), known, "the witness of the backup counts");
         }
-        assert!(
-            !sealer(CounterRule::Sequence, Some(10), Witness::Restored(None)).needs_the_clock_to_unlock()
-        );
+    }
+
+    #[test]
+    fn a_sequence_that_was_forgotten_goes_on_above_a_number_that_somebody_gives_and_no_other() {
+        let forgotten = [
+            (Some(10), Witness::Restored(None), 10),
+            (Some(10), Witness::Restored(Some(Counter(20))), 20),
+            (None, Witness::Restored(None), 0),
+            (Some(10), Witness::Missing, 10),
+            (Some(10), Witness::Damaged("torn".into()), 10),
+        ];
+        for (database, witness, known) in forgotten {
+            let locked = sealer(CounterRule::Sequence, database, witness.clone());
+            assert!(locked.permit(NOW, true).is_err() && !locked.needs_the_clock_to_unlock());
+            let (key, known) = (locked.id, Counter(known));
+            let needed = Err(Refusal::FloorNeeded { key, known });
+            assert_eq!(locked.floor_above(NOW, true, None), needed, "{witness:?}");
+            assert_eq!(locked.floor_above(NOW, true, Some(Counter(1_000))), Ok(Counter(1_000)));
+            assert_eq!(locked.floor_above(NOW, true, Some(known)), Ok(known));
+            for above in [Counter(u64::MAX), COUNTER_MAX] {
+                let refused = Err(Refusal::FloorOutOfRange { above, known });
+                assert_eq!(locked.floor_above(NOW, true, Some(above)), refused);
+            }
+            if known.0 > 0 {
+                let above = Counter(known.0 - 1);
+                let refused = Err(Refusal::FloorOutOfRange { above, known });
+                assert_eq!(locked.floor_above(NOW, true, Some(above)), refused);
+            }
+        }
+        // A witness that is whole has seen every counter that was radiated.
+        let ahead = sealer(CounterRule::Sequence, Some(10), Witness::At(Counter(20)));
+        assert_eq!(ahead.floor_above(NOW, true, None), Ok(Counter(20)));
+        // The clock leads above what was forgotten; a number may lead further.
+        let by_time = sealer(CounterRule::Time, Some(10), Witness::Restored(None));
+        let clock = Counter(u64::try_from(NOW.0).unwrap());
+        assert_eq!(by_time.floor_above(NOW, true, None), Ok(clock));
+        assert_eq!(by_time.floor_above(NOW, true, Some(Counter(11))), Ok(clock));
+        assert_eq!(by_time.floor_above(NOW, true, Some(Counter(clock.0 + 5))), Ok(Counter(clock.0 + 5)));
     }
 
     #[test]
@@ -282,6 +360,28 @@ mod tests {
         for n in 0..100_000_usize {
             utc = utc.plus(steps[n % steps.len()]);
             assert!(spent.insert(seal(&mut second, utc)), "a counter was spent twice");
+        }
+    }
+
+    #[test]
+    fn a_hundred_thousand_seals_of_a_sequence_after_a_restore_lie_above_what_was_given() {
+        let mut first = sealer(CounterRule::Sequence, Some(10), Witness::At(Counter(10)));
+        let mut spent = std::collections::BTreeSet::new();
+        let mut seal = |sealer: &mut Sealer| {
+            let counter = sealer.permit(NOW, true).unwrap().counter;
+            sealer.spend(counter);
+            assert!(spent.insert(counter), "a counter was spent twice");
+            counter
+        };
+        let newest = (0..100_000).map(|_| seal(&mut first)).last();
+        let mut second = sealer(CounterRule::Sequence, Some(10), Witness::Restored(Some(Counter(10))));
+        assert!(second.floor_above(NOW, true, None).is_err());
+        let floor = second.floor_above(NOW, true, newest).unwrap();
+        second.unlocking = Some((super::super::journal::Journal::default().ticket(), floor));
+        second.spend(floor);
+        second.witness_done(floor);
+        for _ in 0..100_000 {
+            seal(&mut second);
         }
     }
 

@@ -92,10 +92,8 @@ impl Station {
     }
 
     /// The floor that an operator confirmed.
-    pub(super) fn confirm_counter(&mut self, now: Now, s: usize, who: &Principal) {
-        let vouched = self.is_vouched();
+    pub(super) fn confirm_counter(&mut self, now: Now, s: usize, who: &Principal, floor: Counter) {
         let Some(sealer) = self.satellites[s].sealer.as_mut() else { return };
-        let floor = sealer.floor(now.utc, vouched);
         sealer.spend(floor);
         let key = sealer.id;
         let record = CounterFloorRecord { key, counter: floor, at: now.utc, who: who.clone() };

@@ -312,7 +312,7 @@ fn carry_out(world: &mut World, act: &Act, watch: &mut Watch) {
         }
         Act::Confirmed => {
             let key = world.key();
-            world.want(Intent::ConfirmCounter(key));
+            world.want(Intent::ConfirmCounter { key, above: None });
             world.want(Intent::VouchClock);
         }
         Act::Arm(armed) => {

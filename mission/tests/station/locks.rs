@@ -61,7 +61,7 @@ fn a_witness_ahead_missing_or_damaged_locks_until_an_operator_confirms() {
         assert!(world.transmits.is_empty(), "{witness:?}");
         world.seen.clear();
         world.confirms = false;
-        world.want(Intent::ConfirmCounter(world.key()));
+        world.want(Intent::ConfirmCounter { key: world.key(), above: None });
         assert!(!world.waiting.iter().any(|effect| matches!(effect, Effect::Witness { .. })));
         world.confirm_persists();
         assert!(world.locked().is_some(), "the floor is durable, the witness is not");
@@ -80,14 +80,39 @@ fn what_was_restored_is_not_unlocked_while_nobody_vouches_for_the_clock() {
     let mut world = unsynchronised(with_key(Some(LAST), Witness::Restored(None)));
     world.come_into_contact();
     world.command(Telecommand::Ping);
-    let id = world.want(Intent::ConfirmCounter(world.key()));
+    let id = world.want(Intent::ConfirmCounter { key: world.key(), above: None });
     assert!(matches!(world.reply(id), Some(Err(Refusal::ClockNotVouched(_)))));
     world.pass(10 * S);
     assert!(world.transmits.is_empty() && world.locked().is_some());
     world.want(Intent::VouchClock);
-    world.want(Intent::ConfirmCounter(world.key()));
+    world.want(Intent::ConfirmCounter { key: world.key(), above: None });
     world.pass(10 * S);
     assert_eq!(world.transmits.len(), 1);
+}
+
+#[test]
+fn a_restored_sequence_is_unlocked_by_a_number_only() {
+    let setup = Setup { profile: sequence_profile(), ..Setup::default() };
+    let key = Key::from_bytes(setup.key).id();
+    let keys = vec![KeySnapshot { key, counter: Some(Counter(7)), witness: Witness::Restored(None) }];
+    let mut world = World::from_snapshot(setup, Snapshot { keys, ..Snapshot::default() });
+    world.come_into_contact();
+    world.command(Telecommand::Ping);
+    let id = world.want(Intent::ConfirmCounter { key, above: None });
+    let Some(Err(refusal)) = world.reply(id) else { panic!("it was taken") };
+    assert_eq!(*refusal, Refusal::FloorNeeded { key, known: Counter(7) });
+    let says = refusal.to_string();
+    assert!(
+        says.contains("--above") && says.contains("satellite") && says.contains("it knows of 7"),
+        "{says}"
+    );
+    let id = world.want(Intent::ConfirmCounter { key, above: Some(Counter(6)) });
+    assert!(matches!(world.reply(id), Some(Err(Refusal::FloorOutOfRange { .. }))));
+    world.pass(10 * S);
+    assert!(world.transmits.is_empty() && world.locked().is_some());
+    world.want(Intent::ConfirmCounter { key, above: Some(Counter(500)) });
+    world.pass(10 * S);
+    assert_eq!(counter_of(world.last_tx()), 501);
 }
 
 #[test]
@@ -95,7 +120,7 @@ fn a_confirmed_floor_of_nothing_is_no_counter_while_nobody_vouches() {
     let mut world = unsynchronised(with_key(None, Witness::Damaged("torn".into())));
     world.come_into_contact();
     world.command(Telecommand::Ping);
-    world.want(Intent::ConfirmCounter(world.key()));
+    world.want(Intent::ConfirmCounter { key: world.key(), above: None });
     world.pass(20 * S);
     assert!(world.transmits.is_empty(), "{:?}", world.locked());
     world.handle(Input::Clock { synchronised: true });
@@ -106,7 +131,7 @@ fn a_confirmed_floor_of_nothing_is_no_counter_while_nobody_vouches() {
 #[test]
 fn confirming_a_counter_that_is_not_locked_is_refused() {
     let mut world = World::in_contact();
-    let id = world.want(Intent::ConfirmCounter(world.key()));
+    let id = world.want(Intent::ConfirmCounter { key: world.key(), above: None });
     assert!(matches!(world.reply(id), Some(Err(Refusal::NotLocked(_)))));
 }
 

@@ -175,7 +175,7 @@ fn a_database_that_went_back_repeats_nothing_that_must_not_be() {
         Stage::Unknown,
         "it may have been radiated in the lost time"
     );
-    world.want(Intent::ConfirmCounter(world.key()));
+    world.want(Intent::ConfirmCounter { key: world.key(), above: None });
     assert_eq!(world.locked(), None);
     world.come_into_contact();
     assert_eq!(world.last_request().1, Telecommand::Ping);
@@ -198,7 +198,7 @@ fn sealed_bytes_below_a_confirmed_floor_are_sealed_anew() {
     let ahead = Counter(sealed.counter.0 + 1_000_000_000);
     world.witness = Witness::At(ahead);
     world.restart();
-    world.want(Intent::ConfirmCounter(world.key()));
+    world.want(Intent::ConfirmCounter { key: world.key(), above: None });
     world.come_into_contact();
     world.pass(5 * S);
     assert_eq!(world.transmits.len(), 1);

@@ -3,12 +3,12 @@
 
 use api::ProblemKind as K;
 use api::{
-    AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, DownloadRequest,
-    DownloadView, EarView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport, FrameView,
-    HandoverReport, Health, HeldElements, ImageView, ImportReport, ImportRequest, LatestValue, LimitView,
-    LookList, MonthReport, Nothing, Outcome, OutsideView, ParameterView, PassKept, PassList, PassReport,
-    PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, StreamMessage, StreamRequest,
-    TelemetryPage, Version,
+    AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, CounterConfirmation,
+    DownloadRequest, DownloadView, EarView, ElementsAdded, ElementsRequest, ElementsSource, EventView,
+    FetchReport, FrameView, HandoverReport, Health, HeldElements, ImageView, ImportReport, ImportRequest,
+    LatestValue, LimitView, LookList, MonthReport, Nothing, Outcome, OutsideView, ParameterView, PassKept,
+    PassList, PassReport, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, StreamMessage,
+    StreamRequest, TelemetryPage, Version,
 };
 
 use super::operation::{Doc, Kind, Param, delete, get, param, post, required};
@@ -92,10 +92,10 @@ fn server() -> Vec<Doc> {
             "confirm_counter",
             "I know why counter and witness disagree",
         )
-        .body::<Nothing>()
+        .body::<CounterConfirmation>()
         .json::<Outcome>()
         .problems(&INTENT)
-        .problems(&[K::UnknownKey, K::NotLocked]),
+        .problems(&[K::UnknownKey, K::NotLocked, K::ClockNotVouched, K::FloorNeeded, K::BadArgument]),
     ]
 }
 

@@ -92,8 +92,13 @@ pub enum BackupError {
         source: io::Error,
     },
     /// There is nothing to take a backup of.
-    #[error("{} is no data folder: there is no ground.sqlite3. Name the folder with --data, or the configuration with --config", .0.display())]
+    #[error("{} is no data folder: there is no ground.sqlite3. Name the folder with --data, or the configuration with --config; an archive in PostgreSQL is backed up with pg_dump", .0.display())]
     NoDataFolder(PathBuf),
+    /// The archive is no file.
+    #[error(
+        "the archive is a PostgreSQL: take its backup with `pg_dump --format=custom --file=ground.dump {0}`, and leave witness/ where it is (docs/storage.md, Backup)"
+    )]
+    Postgres(String),
     /// Two at once.
     #[error("another backup to {} is under way: wait for it, or choose another name", .0.display())]
     UnderWay(PathBuf),
@@ -127,7 +132,14 @@ impl BackupError {
     /// It could be done and must not, as opposed to: it was tried and did not work.
     #[must_use]
     pub fn is_refusal(&self) -> bool {
-        matches!(self, Self::UnderWay(_) | Self::NewerSchema { .. } | Self::NotEmpty(_) | Self::Exists(_))
+        matches!(
+            self,
+            Self::Postgres(_)
+                | Self::UnderWay(_)
+                | Self::NewerSchema { .. }
+                | Self::NotEmpty(_)
+                | Self::Exists(_)
+        )
     }
 }
 

@@ -79,6 +79,15 @@ pub(super) async fn clock(config: &Config) -> Finding {
 
 pub(super) fn backups(config: &Config, now: UtcUs) -> Option<Finding> {
     let check = "backup";
+    if let Some(database) = &config.storage.database {
+        let remedy =
+            format!("Let the database's server take them, e.g. `pg_dump --format=custom {database}`.");
+        return Some(Finding::watch(
+            check,
+            "the archive is a PostgreSQL: its backups are not seen here",
+            remedy,
+        ));
+    }
     let Some(section) = &config.backup else {
         let remedy = "Add a [backup] section, or take one by `gs-server backup` from a timer of your own.";
         return Some(Finding::watch(check, "the server takes none", remedy));

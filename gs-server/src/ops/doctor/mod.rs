@@ -5,6 +5,7 @@
 
 mod machine;
 mod network;
+mod postgres;
 mod state;
 
 use std::path::Path;

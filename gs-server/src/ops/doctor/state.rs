@@ -11,10 +11,10 @@ use protocol::Counter;
 
 use super::{Finding, days, with_reasons};
 use crate::clock::SystemClock;
-use crate::config::Config;
+use crate::config::{Config, CounterSetting};
 use crate::keys;
 use crate::ops::metrics::machine::Folder;
-use crate::storage::{DATABASE, Inspection, inspect_database};
+use crate::storage::{Archive, DATABASE, Inspection, inspect_database};
 use crate::witness::WitnessFolder;
 
 /// A disk that takes longer to make a small file durable holds up every frame and every command.
@@ -122,11 +122,19 @@ fn sync(folder: &Path) -> Finding {
 
 pub(super) async fn database(config: &Config, now: UtcUs) -> Vec<Finding> {
     let check = "database";
+    if config.storage.database.is_some() {
+        let (mut findings, inspection) = super::postgres::database(config).await;
+        if let Some(inspection) = &inspection {
+            findings.extend(witness(config, inspection));
+            findings.extend(elements(config, inspection, now));
+        }
+        return findings;
+    }
     let folder = &config.storage.folder;
     if !folder.join(DATABASE).is_file() {
         return vec![Finding::ok(check, "there is none yet: the first start makes it")];
     }
-    let inspection = match inspect_database(folder).await {
+    let inspection = match inspect_database(&Archive::in_folder(folder)).await {
         Ok(inspection) => inspection,
         Err(error) => {
             let remedy = "Do what it says; docs/storage.md tells how to restore a backup.";
@@ -136,8 +144,8 @@ pub(super) async fn database(config: &Config, now: UtcUs) -> Vec<Finding> {
     let facts = &inspection.facts;
     let known = migrations::newest_sqlite();
     let told = format!(
-        "whole ({} rows looked at): {} frames, {} events, schema {}, SQLite {}",
-        inspection.rows_checked, facts.last_frame, facts.last_event, facts.schema, inspection.sqlite
+        "whole ({} rows looked at): {} frames, {} events, schema {}, {}",
+        inspection.rows_checked, facts.last_frame, facts.last_event, facts.schema, inspection.engine
     );
     let first = if facts.schema > known {
         let told = format!("it has schema {}, this program knows up to {known}", facts.schema);
@@ -208,7 +216,14 @@ fn witness(config: &Config, inspection: &Inspection) -> Vec<Finding> {
             (_, Witness::Restored(_)) => Finding::warning(
                 check,
                 "the folder was restored from a backup. Nothing is sealed",
-                "See that the clock is right, then confirm the counter: `gs-server key confirm`.",
+                match satellite.counter {
+                    CounterSetting::Time => {
+                        "See that the clock is right, then confirm the counter: `gs-server key confirm`."
+                    }
+                    CounterSetting::Sequence => {
+                        "Find out the last counter that was used (the satellite may tell), then: `gs-server key confirm --above N`."
+                    }
+                },
             ),
         }
     });

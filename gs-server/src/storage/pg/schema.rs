@@ -8,7 +8,7 @@ use sqlx::migrate::MigrateError;
 
 use crate::storage::convert::parse;
 use crate::storage::db::sql;
-use crate::storage::open::{check_mark, meta};
+use crate::storage::open::{check_mark, meta, tell_upgrade};
 use crate::storage::row::{Digest, Feed as _, Row as _, upsert};
 use crate::storage::rows::MetaRow;
 use crate::storage::{StoreError, StoreOptions};
@@ -26,6 +26,7 @@ pub(super) async fn bring_up_to_date(
         if let Some(found) = found.filter(|found| *found > known) {
             return Err(StoreError::NewerSchema { found, known });
         }
+        tell_upgrade(found, known);
     }
     let found = match has_table(connection, "meta").await? {
         true => meta(&mut *connection).await?,

@@ -33,7 +33,7 @@ fn alert(id: u64, level: Level) -> Alert {
     }
 }
 
-fn full_of_everything(id: u64) -> Alert {
+pub(super) fn full_of_everything(id: u64) -> Alert {
     Alert {
         returned_at: Some(UtcUs(NOON_US + 3)),
         acknowledged: Some(Signed { who: Principal::new("anna"), at: UtcUs(NOON_US + 4) }),
@@ -48,7 +48,7 @@ fn full_of_everything(id: u64) -> Alert {
     }
 }
 
-fn message(number: &str, alert: u64, state: DeliveryState) -> Delivery {
+pub(super) fn message(number: &str, alert: u64, state: DeliveryState) -> Delivery {
     Delivery {
         message_id: number.into(),
         alert: Some(AlertId(alert)),

@@ -37,6 +37,7 @@ mod sky;
 mod snapshot;
 mod telemetry;
 mod upgrade;
+mod upgrade_rows;
 
 use std::path::PathBuf;
 

@@ -17,7 +17,7 @@ const TEXT: &str = r#"{"name":"status","satellite":"pixelsat-1","transmit":true,
     "attach":{"min_max_elevation_deg":20.0},
     "steps":[{"do":"listen","for_s":5.5},{"do":"command","command":"Ping","when":{"elevation_deg":10.0}}]}"#;
 
-fn plan(id: u64, armed: bool) -> PlanRecord {
+pub(super) fn plan(id: u64, armed: bool) -> PlanRecord {
     let words = serde_json::from_str(TEXT).unwrap();
     let context = CheckContext { timing: Default::default(), profile: None, pass: None, now: None };
     PlanRecord {
@@ -33,7 +33,7 @@ fn plan(id: u64, armed: bool) -> PlanRecord {
     }
 }
 
-fn run(id: u64, plan: u64, state: RunState, end: Option<RunEnd>) -> Record {
+pub(super) fn run(id: u64, plan: u64, state: RunState, end: Option<RunEnd>) -> Record {
     let ask = Ask { ticket: Ticket::Command(CommandId(1)), stage: Some(Stage::Radiated) };
     Record::Run(Box::new(RunRecord {
         id: RunId(id),

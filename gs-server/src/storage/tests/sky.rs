@@ -39,11 +39,11 @@ fn elements(id: u64, satellite: &SatelliteId, set: Elements) -> Record {
     })
 }
 
-fn epoch(id: u64, epoch_us: i64) -> Record {
+pub(super) fn epoch(id: u64, epoch_us: i64) -> Record {
     elements(id, &route().satellite, Elements { epoch: at(epoch_us), ..omm() })
 }
 
-fn pass(id: u64, used: &[(u64, i64)], ended_at: Option<i64>) -> PassRecord {
+pub(super) fn pass(id: u64, used: &[(u64, i64)], ended_at: Option<i64>) -> PassRecord {
     PassRecord {
         id: PassId(id),
         satellite: route().satellite,
