@@ -8,6 +8,7 @@
 //! | `value` | the expected number of missing chunks that come home |
 //! | `search` | entries one by one, the best first, then each again among the others |
 //! | `bound` | what no schedule can exceed |
+//! | `history` | what the archive knows of those who heard it before |
 //! | `battery` | what the transmitter may take |
 //! | `pointing` | where the antenna should look |
 //! | `answer` | the schedule, explained |
@@ -23,6 +24,7 @@ mod answer;
 mod battery;
 mod bound;
 mod coverage;
+mod history;
 mod pointing;
 mod search;
 mod task;
@@ -30,4 +32,5 @@ mod value;
 
 pub use answer::{DownlinkPlan, Ear, Entry, expected_of, plan, round_robin};
 pub use coverage::Coverage;
+pub use history::{HeardBy, joined, listeners};
 pub use task::{Battery, LISTENERS_MAX, Link, Listener, Pointing, Rules, Task, TaskError, WINDOW_DAYS_MAX};

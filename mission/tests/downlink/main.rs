@@ -3,5 +3,6 @@
 #![expect(clippy::unwrap_used, reason = "what is made up here is valid")]
 
 mod bound;
+mod history;
 mod rules;
 mod world;

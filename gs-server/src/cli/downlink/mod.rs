@@ -1,6 +1,8 @@
 //! `gs-server downlink`: when the satellite should send its picture to strangers.
 
+mod budget;
 mod map;
+mod own;
 mod stations;
 mod text;
 
@@ -10,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use api::FineTime;
 use clap::{Args, Subcommand};
-use mission::downlink::{DownlinkPlan, Link, Task, TaskError};
+use mission::downlink::{Battery, DownlinkPlan, Link, Pointing, Task, TaskError};
 use mission::sky::{ElementsAge, utc};
 use mission::{PlanName, SatelliteId, UtcUs};
 use serde::Serialize;
@@ -35,10 +37,12 @@ pub enum Downlink {
 /// `gs-server downlink plan`.
 #[derive(Debug, Args)]
 #[command(
-    override_usage = "gs-server downlink plan [OPTIONS] --elements <FILE> --station <STATION>\n       \
+    override_usage = "gs-server downlink plan [OPTIONS] --config <FILE>\n       \
+                      gs-server downlink plan [OPTIONS] --elements <FILE> --station <STATION>\n           \
                       --stations <FILE> --chunks <RANGES>",
     after_help = "\
 Examples:
+  gs-server downlink plan --config station.toml --stations tinygs.json --plan night.toml --runs 200
   gs-server downlink plan --elements gp.json --station 46.5191,6.5668,410 --stations tinygs.json \\
       --chunks 0-112
   gs-server downlink plan --elements gp.json --station 46.5191,6.5668,410 --stations tinygs.json \\
@@ -51,24 +55,34 @@ The list of stations of TinyGS is such an array. Nothing is scheduled while the 
 --station: it must hear us there. Nothing is sent: --plan writes a plan with one step, upload-schedule,
 which goes the way of every plan.
 
+With --config the elements, the place and the satellite are the station's own, the chunks are those that
+the newest unfinished image misses (or --image), and whoever heard the satellite in the last 30 days is
+a station as well, with the share of its passes in which it did. The server must run.
+
 Exit code 1 if no schedule brings anything, 2 if the arguments make no sense."
 )]
 pub struct DownlinkArgs {
+    /// The configuration of a station whose server runs: what is not given comes from there
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
     /// A file of elements, or - for standard input
-    #[arg(long, value_name = "FILE", required = true)]
+    #[arg(long, value_name = "FILE", required_unless_present = "config", conflicts_with = "config")]
     elements: Vec<PathBuf>,
-    /// The satellite of the elements, where the file has several: name, number or designator
+    /// The satellite, where there are several: name, number or designator
     #[arg(long, value_name = "SATELLITE")]
     satellite: Option<String>,
     /// The own station, over which the satellite is silent: LATITUDE,LONGITUDE,HEIGHT_M
-    #[arg(long, value_name = "STATION", allow_hyphen_values = true)]
-    station: Place,
+    #[arg(long, value_name = "STATION", allow_hyphen_values = true, required_unless_present = "config")]
+    station: Option<Place>,
     /// Stations that may hear it
-    #[arg(long, value_name = "FILE")]
-    stations: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "config")]
+    stations: Option<PathBuf>,
     /// Missing chunks, such as 0-112 or 3,5-9
-    #[arg(long, value_name = "RANGES", value_parser = chunks)]
-    chunks: Chunks,
+    #[arg(long, value_name = "RANGES", value_parser = chunks, required_unless_present = "config")]
+    chunks: Option<Chunks>,
+    /// With --config: the chunks that this image misses
+    #[arg(long, value_name = "NUMBER", requires = "config", conflicts_with = "chunks")]
+    image: Option<u64>,
     /// When the schedule is on board, UTC
     #[arg(long, value_name = "T", default_value = "now", allow_hyphen_values = true)]
     from: Moment,
@@ -81,6 +95,13 @@ pub struct DownlinkArgs {
     /// Chunks of one entry, at most: so long the satellite is deaf
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=512))]
     entry_chunks: u16,
+    /// The battery, which must stay above its floor: capacity_wh=…,charge_wh=…,floor_wh=…,sunlit_w=…,load_w=…,transmit_w=…
+    #[arg(long, value_name = "VALUES", value_parser = budget::battery)]
+    battery: Option<Battery>,
+    /// An antenna that is better in one direction: axis=X/Y/Z,loose_db=…,held_db=…,settle_s=…; each entry carries the
+    /// attitude that brings it to nadir
+    #[arg(long, value_name = "VALUES", value_parser = budget::antenna, allow_hyphen_values = true)]
+    antenna: Option<Pointing>,
     /// Rehearse the schedule on the twin so often
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=RUNS_MAX))]
     runs: u32,
@@ -93,9 +114,9 @@ pub struct DownlinkArgs {
     /// The name of that plan
     #[arg(long, value_name = "NAME", default_value = "downlink", value_parser = PlanName::new)]
     name: PlanName,
-    /// What the configuration calls the satellite, for that plan
-    #[arg(long, value_name = "NAME", default_value = "pixelsat-1", value_parser = SatelliteId::new)]
-    satellite_name: SatelliteId,
+    /// What the configuration calls the satellite, for that plan; `pixelsat-1`, or as --config has it
+    #[arg(long, value_name = "NAME", value_parser = SatelliteId::new)]
+    satellite_name: Option<SatelliteId>,
     /// One JSON object
     #[arg(long)]
     json: bool,
@@ -169,22 +190,48 @@ impl DownlinkArgs {
         let now = now();
         let from = self.from.resolve(now, now);
         let until = self.until.resolve(now, from);
-        let sky = SkyArgs::of(self.elements.clone(), vec![self.station.clone()], None).read((from, until))?;
-        let elements = self.elements_of(&sky, from)?;
-        let listed = stations::read(&self.stations)?;
+        let places = self.station.iter().cloned().collect();
+        let sky = SkyArgs::of(self.elements.clone(), places, self.config.clone()).read((from, until))?;
+        let (elements, label) = self.elements_of(&sky, from)?;
+        let station = sky.places.first().ok_or_else(|| Failure::usage("no station: give --station"))?;
+        let own = match &self.config {
+            Some(config) => Some(own::ask(config, &label, self.image, self.chunks.is_none(), utc(from))?),
+            None => None,
+        };
+        let listed = match &self.stations {
+            Some(stations) => stations::read(stations)?,
+            None => stations::Listed::default(),
+        };
         tell(listed.refused.iter().cloned(), "stations left out");
-        let mut task = Task::new(elements, listed.listeners, self.chunks.0.clone(), utc(from), utc(until));
+        let mut listeners = listed.listeners;
+        let mut missing = self.chunks.as_ref().map(|chunks| chunks.0.clone()).unwrap_or_default();
+        if let Some(own) = own {
+            let known = mission::downlink::listeners(&elements, sky.orientation, &own.heard, utc(from));
+            listeners = mission::downlink::joined(listeners, known.map_err(failure)?);
+            missing = self.chunks.as_ref().map_or(own.missing, |chunks| chunks.0.clone());
+        }
+        if listeners.is_empty() {
+            return Err(Failure::failed(
+                "nobody has heard the satellite yet, and no list of stations was given: name one with --stations",
+            ));
+        }
+        let mut task = Task::new(elements, listeners, missing, utc(from), utc(until));
         task.link.margin_500km_db = self.margin;
         task.rules.chunks_max = self.entry_chunks;
         task.orientation = sky.orientation;
-        task.silent = self.silent(&task).map_err(failure)?;
+        task.battery = self.battery;
+        task.pointing = self.antenna;
+        task.silent = silent(&task, station).map_err(failure)?;
         let found = mission::downlink::plan(&task).map_err(failure)?;
         let rehearsed = self.rehearse(&task, &found)?;
         if let Some(path) = &self.map {
-            write(path, &map::svg(&task, &found, &self.station)?)?;
+            write(path, &map::svg(&task, &found, station)?)?;
         }
         if let Some(path) = &self.plan {
-            write(path, &text::plan(&found, &self.name, &self.satellite_name))?;
+            let own = || self.config.as_ref().and_then(|_| SatelliteId::new(&label).ok());
+            let satellite = self.satellite_name.clone().or_else(own);
+            let satellite = satellite.map_or_else(|| SatelliteId::new("pixelsat-1"), Ok);
+            write(path, &text::plan(&found, &self.name, &satellite.map_err(Failure::usage)?))?;
         }
         let answer = answer(&task, &found, listed.refused.len(), rehearsed);
         if self.json {
@@ -195,7 +242,8 @@ impl DownlinkArgs {
         Ok(if found.entries.is_empty() { Exit::Failed } else { Exit::Done })
     }
 
-    fn elements_of(&self, sky: &Sky, from: UtcInstant) -> Result<Elements, Failure> {
+    /// The elements, and what their satellite is called.
+    fn elements_of(&self, sky: &Sky, from: UtcInstant) -> Result<(Elements, String), Failure> {
         let named = |wanted: &String| {
             sky.catalogue.objects.iter().find(|object| {
                 object.label().eq_ignore_ascii_case(wanted)
@@ -214,18 +262,7 @@ impl DownlinkArgs {
                 Failure::usage(format!("no satellite of the elements is called '{wanted}'"))
             })?,
         };
-        Ok(object.set_for(from).clone())
-    }
-
-    /// The passes over the own station.
-    fn silent(&self, task: &Task) -> Result<Vec<Range<UtcUs>>, TaskError> {
-        let search = PassSearch {
-            orientation: task.orientation,
-            ..PassSearch::new(mission::sky::instant(task.from), mission::sky::instant(task.until), 0.0)
-        };
-        let place = std::slice::from_ref(&self.station.station);
-        let found = PassFinder::new(&task.elements)?.find(place, &search)?;
-        Ok(found.stations.iter().flatten().map(|pass| utc(pass.aos.at)..utc(pass.los.at)).collect())
+        Ok((object.set_for(from).clone(), object.label()))
     }
 
     fn rehearse(&self, task: &Task, found: &DownlinkPlan) -> Result<Option<Rehearsed>, Failure> {
@@ -244,6 +281,17 @@ impl DownlinkArgs {
             elements_timing_error_s: timing_s,
         }))
     }
+}
+
+/// The passes over the own station.
+fn silent(task: &Task, own: &Place) -> Result<Vec<Range<UtcUs>>, TaskError> {
+    let search = PassSearch {
+        orientation: task.orientation,
+        ..PassSearch::new(mission::sky::instant(task.from), mission::sky::instant(task.until), 0.0)
+    };
+    let place = std::slice::from_ref(&own.station);
+    let found = PassFinder::new(&task.elements)?.find(place, &search)?;
+    Ok(found.stations.iter().flatten().map(|pass| utc(pass.aos.at)..utc(pass.los.at)).collect())
 }
 
 fn answer(task: &Task, found: &DownlinkPlan, refused: usize, rehearsed: Option<Rehearsed>) -> Answer {
