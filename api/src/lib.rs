@@ -115,16 +115,22 @@ pub use version::{Health, Version};
 pub const API_VERSION: u32 = 1;
 
 /// What this version can do; a client asks for a capability by name, never by version number.
-pub const CAPABILITIES: [&str; 11] = [
+pub const CAPABILITIES: [&str; 17] = [
     "alerts",
-    "forwards",
+    "antenna",
+    "approvals",
     "archive",
     "commands",
     "downloads",
+    "forwards",
     "images",
     "idempotency",
     "limits",
+    "people",
     "plans",
+    "receptions",
+    "rehearsals",
+    "reports",
     "stream-resume",
     "stream-topics",
 ];

@@ -40,7 +40,7 @@ use crate::lifecycle::Lifecycle;
 use crate::links::{self, LinkParts};
 use crate::ops::{sd, upkeep::UpkeepTask};
 use crate::others::Follower;
-use crate::people::{People, PeopleSettings};
+use crate::people::{People, PeopleSettings, SessionRules};
 use crate::pointing::{Place, Steering};
 use crate::report::ReportTask;
 use crate::storage::{Store, StoreError};
@@ -330,6 +330,10 @@ async fn people(
     let settings = PeopleSettings {
         two_person: config.people.two_person == TwoPerson::Critical,
         approval_us: (config.people.approval_h * 3.6e9) as i64,
+        session: SessionRules {
+            idle_us: (config.people.session_idle_min * 6e7) as i64,
+            max_us: (config.people.session_max_h * 3.6e9) as i64,
+        },
         https: config.http.https || config.http.tls.is_some(),
         open_reading: config.http.open_reading,
         on_loopback: address.ip().to_canonical().is_loopback()

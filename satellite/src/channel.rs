@@ -13,7 +13,7 @@ use crate::{
 
 /// Distance that [`RSSI_ZENITH_DBM`] refers to, km.
 const REFERENCE_KM: f64 = 500.0;
-/// Received power at 500 km, dBm: a small directional antenna on the ground (radio.md 8).
+/// Received power at 500 km, dBm: a small directional antenna on the ground, see docs/twin.md.
 const RSSI_ZENITH_DBM: f64 = -106.0;
 /// Extra loss at the very horizon (ground reflection, buildings), dB; gone at [`HORIZON_DEG`].
 const HORIZON_LOSS_DB: f64 = 4.0;

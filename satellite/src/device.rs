@@ -26,7 +26,8 @@ const NOISE_LEAD_US: u64 = 40_000;
 const NOISE_DBM: i16 = -125;
 /// Address of everyone.
 const BROADCAST: u16 = 0xFFFF;
-/// A receiver hears a carrier this far from its own: a quarter of 500 kHz (radio.md 8).
+/// A receiver hears a carrier this far from its own: a quarter of 500 kHz, the wider of the two bandwidths that
+/// the module may have (docs/twin.md).
 const TUNING_MAX_HZ: f64 = 125_000.0;
 /// The Doppler shift that the module takes in any case, Hz: a quarter of 125 kHz, the narrower of the two bandwidths that it
 /// may have. At 435 MHz no orbit above 200 km shifts more than 11 kHz, so nothing is lost to it; what is left is the

@@ -136,7 +136,7 @@ impl PassProfile {
     }
 }
 
-/// Distance to the satellite at this elevation, km (radio.md 8).
+/// Distance to the satellite at this elevation, km: a spherical Earth, a circular orbit.
 #[must_use]
 pub fn range_km(elevation_deg: f64) -> f64 {
     let sin_elevation = elevation_deg.clamp(0.0, 90.0).to_radians().sin();

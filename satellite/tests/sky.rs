@@ -242,7 +242,7 @@ fn doppler_is_counted_and_stays_within_what_the_module_takes() {
     let mut device = Device::new(DeviceConfig::new(twin, channel, ModelConfig::prepared(true)));
     while device.poll(1_200 * SECOND_US).is_some() {}
     let worst_hz = device.stats().doppler_max_hz;
-    // 435 MHz, 510 km: up to 10 kHz (radio.md 8), the Earth's turning included.
+    // 435 MHz, 510 km: up to 10 kHz (docs/twin.md), the Earth's turning included.
     assert!((9_300..10_900).contains(&worst_hz) && worst_hz < DOPPLER_TOLERANCE_HZ, "{worst_hz}");
 }
 

@@ -1,5 +1,4 @@
-//! A typed client of the API: one method for each operation of reading, commanding, downloads, elements, plans and
-//! runs, and the [stream](EventStream) that comes back by itself.
+//! A typed client of the API: one method for each operation but those that need a browser's cookie, and the [stream](EventStream) that comes back by itself.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), api::client::ClientError> {
@@ -22,7 +21,9 @@
 
 mod error;
 mod filter;
+mod operation;
 mod operations;
+mod others;
 mod stream;
 mod timers;
 
@@ -38,6 +39,7 @@ use crate::Problem;
 pub use error::ClientError;
 use error::chain;
 pub use filter::Filter;
+pub use operation::Operation;
 pub use operations::ImageFile;
 pub use stream::{EventStream, StreamItem, StreamOptions};
 
@@ -126,6 +128,27 @@ impl Client {
             Ok(bearer)
         });
         Ok(Self { base: base(address)?, http, token: token.transpose()? })
+    }
+
+    /// Every operation that this client has a method for.
+    pub fn operations() -> impl Iterator<Item = Operation> {
+        let stream = [stream::STREAM];
+        operations::ALL.into_iter().chain(others::ALL).flatten().copied().chain(stream)
+    }
+
+    /// Anything that is a text, by its path below `/api/v1/`.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub async fn text(&self, path: &str, filter: &Filter) -> Result<String, ClientError> {
+        let url = self.url(path, filter)?;
+        let response = self.send(self.http.get(url.clone()), &url, PATIENCE).await?;
+        let status = response.status().as_u16();
+        String::from_utf8(bytes(response, &url).await?).map_err(|error| ClientError::Strange {
+            url: url.to_string(),
+            status,
+            why: error.to_string(),
+        })
     }
 
     /// Anything that can be read, by its path below `/api/v1/`.

@@ -1,9 +1,11 @@
 //! One method for each operation of reading, commanding, downloads, elements, plans and runs.
 
+use super::operation::{Operation, operations};
 use super::{
     ACCEPT, Client, ClientError, Duration, Filter, HeaderMap, HeaderValue, IF_NONE_MATCH, IdempotencyKey,
-    Method, StatusCode, bytes, segment,
+    Method, StatusCode, bytes,
 };
+
 use crate::{
     AntennaView, AttachRequest, AuditView, ChunkMap, CommandRequest, CommandView, CounterConfirmation,
     DownloadRequest, DownloadView, ElementsAdded, ElementsRequest, ElementsSource, EventView, FetchReport,
@@ -28,65 +30,7 @@ pub struct ImageFile {
     pub tag: Option<String>,
 }
 
-macro_rules! reads {
-    ($($(#[$meta:meta])* $name:ident -> $answer:ty = $path:literal;)*) => {
-        impl Client {
-            $($(#[$meta])*
-            ///
-            /// # Errors
-            /// [`ClientError`].
-            pub async fn $name(&self) -> Result<$answer, ClientError> {
-                self.get($path, &Filter::new()).await
-            })*
-        }
-    };
-}
-
-macro_rules! lists {
-    ($($(#[$meta:meta])* $name:ident -> $answer:ty = $path:literal;)*) => {
-        impl Client {
-            $($(#[$meta])*
-            ///
-            /// # Errors
-            /// [`ClientError`].
-            pub async fn $name(&self, filter: &Filter) -> Result<$answer, ClientError> {
-                self.get($path, filter).await
-            })*
-        }
-    };
-}
-
-macro_rules! ones {
-    ($($(#[$meta:meta])* $name:ident -> $answer:ty = $path:literal;)*) => {
-        impl Client {
-            $($(#[$meta])*
-            ///
-            /// # Errors
-            /// [`ClientError`].
-            pub async fn $name(&self, id: u64) -> Result<$answer, ClientError> {
-                self.get(&$path.replacen('*', &id.to_string(), 1), &Filter::new()).await
-            })*
-        }
-    };
-}
-
-/// Verbs on something that has a name or a number.
-macro_rules! verbs {
-    ($($(#[$meta:meta])* $name:ident($of:ty) = $path:literal;)*) => {
-        impl Client {
-            $($(#[$meta])*
-            ///
-            /// # Errors
-            /// [`ClientError`].
-            pub async fn $name(&self, of: $of, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
-                let of = segment(&of.to_string());
-                self.post(&$path.replacen('*', &of, 1), &Nothing {}, key).await
-            })*
-        }
-    };
-}
-
-reads! {
+operations! { READ, read:
     /// The handshake: who is there and what it can.
     version -> Version = "version";
     /// How the station is right now.
@@ -105,7 +49,7 @@ reads! {
     sources -> Page<ElementsSource> = "elements/sources";
 }
 
-lists! {
+operations! { LIST, list:
     /// Raw frames, newest first.
     frames -> Page<FrameView> = "frames";
     /// One parameter over time: `parameter`, `satellite`, `start`, `stop`, `max_points`.
@@ -134,39 +78,70 @@ lists! {
     runs -> Page<RunView> = "runs";
 }
 
-ones! {
+operations! { ONE, one:
     /// One frame, decoded field by field.
-    frame -> FrameView = "frames/*";
+    frame(u64) -> FrameView = "frames/{id}";
     /// One command with all its stages.
-    command -> CommandView = "commands/*";
+    command(u64) -> CommandView = "commands/{id}";
     /// One download.
-    download -> DownloadView = "downloads/*";
+    download(u64) -> DownloadView = "downloads/{id}";
     /// One image.
-    image -> ImageView = "images/*";
+    image(u64) -> ImageView = "images/{id}";
     /// Which chunks of an image are held.
-    image_chunks -> ChunkMap = "images/*/chunks";
+    image_chunks(u64) -> ChunkMap = "images/{id}/chunks";
     /// The report of one run.
-    run -> RunReport = "runs/*";
+    run(u64) -> RunReport = "runs/{id}";
 }
 
-verbs! {
-    /// Withdraws a command that was not radiated.
-    cancel_command(u64) = "commands/*/cancel";
-    /// Asks for no more of an image.
-    cancel_download(u64) = "downloads/*/cancel";
-    /// The link may transmit.
-    arm_link(&str) = "links/*/arm";
-    /// The link must not transmit any more.
-    disarm_link(&str) = "links/*/disarm";
-    /// The plan may run.
-    arm_plan(&str) = "plans/*/arm";
-    /// The plan must not run any more.
-    disarm_plan(&str) = "plans/*/disarm";
-    /// Takes a satellite over from the plan that runs.
-    hold(&str) = "satellites/*/hold";
-    /// Gives it back.
-    release(&str) = "satellites/*/release";
+operations! { ACT, act:
+    /// Says that this machine's clock is right.
+    vouch_clock -> Outcome = "clock/vouch";
 }
+
+operations! { VERB, verb:
+    /// Withdraws a command that was not radiated.
+    cancel_command(u64) -> Outcome = "commands/{id}/cancel";
+    /// Asks for no more of an image.
+    cancel_download(u64) -> Outcome = "downloads/{id}/cancel";
+    /// The link may transmit.
+    arm_link(&str) -> Outcome = "links/{id}/arm";
+    /// The link must not transmit any more.
+    disarm_link(&str) -> Outcome = "links/{id}/disarm";
+    /// The plan may run.
+    arm_plan(&str) -> Outcome = "plans/{name}/arm";
+    /// The plan must not run any more.
+    disarm_plan(&str) -> Outcome = "plans/{name}/disarm";
+    /// Takes a satellite over from the plan that runs.
+    hold(&str) -> Outcome = "satellites/{name}/hold";
+    /// Gives it back.
+    release(&str) -> Outcome = "satellites/{name}/release";
+}
+
+operations! { GIVE, give:
+    /// Has a telecommand sent.
+    send_command(CommandRequest) -> Outcome = "commands";
+    /// Has an image brought home.
+    order_download(DownloadRequest) -> Outcome = "downloads";
+    /// Adds elements of one satellite.
+    add_elements(ElementsRequest) -> ElementsAdded = "elements";
+    /// Hands a plan over; it is not armed.
+    add_plan(PlanText) -> Outcome = "plans";
+}
+
+operations! { REMOVE, remove:
+    /// Takes a plan out of use.
+    withdraw_plan(&str) -> Outcome = "plans/{name}";
+}
+
+const CONFIRM: Operation = Operation::post("keys/{id}/confirm-counter");
+const HEALTH: Operation = Operation::get("health");
+const FETCH: Operation = Operation::post("elements/fetch");
+const ATTACH: Operation = Operation::post("plans/{name}/attach");
+const DETACH: Operation = Operation::post("plans/{name}/detach");
+const IMAGE_FILE: Operation = Operation::get("images/{id}/file");
+
+pub(super) const ALL: [&[Operation]; 8] =
+    [READ, LIST, ONE, ACT, VERB, GIVE, REMOVE, &[CONFIRM, HEALTH, FETCH, ATTACH, DETACH, IMAGE_FILE]];
 
 impl Client {
     /// I know why counter and witness of this key disagree; with `above`, sealing goes on above that counter.
@@ -179,8 +154,7 @@ impl Client {
         above: Option<u64>,
         key: &IdempotencyKey,
     ) -> Result<Outcome, ClientError> {
-        let path = format!("keys/{}/confirm-counter", segment(of));
-        self.post(&path, &CounterConfirmation { above }, key).await
+        self.post(&CONFIRM.of(&of), &CounterConfirmation { above }, key).await
     }
 
     /// Whether the server can do its work; an answer also when it cannot.
@@ -188,7 +162,7 @@ impl Client {
     /// # Errors
     /// [`ClientError`].
     pub async fn health(&self) -> Result<Health, ClientError> {
-        let url = self.url("health", &Filter::new())?;
+        let url = self.url(HEALTH.path, &Filter::new())?;
         let answer = super::timers::within(super::PATIENCE, self.http.get(url.clone()).send()).await;
         let no_answer = |why| ClientError::NoAnswer { url: url.to_string(), why };
         let response = answer
@@ -200,72 +174,12 @@ impl Client {
         }
     }
 
-    /// Has a telecommand sent.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub async fn send_command(
-        &self,
-        request: &CommandRequest,
-        key: &IdempotencyKey,
-    ) -> Result<Outcome, ClientError> {
-        self.post("commands", request, key).await
-    }
-
-    /// Has an image brought home.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub async fn order_download(
-        &self,
-        request: &DownloadRequest,
-        key: &IdempotencyKey,
-    ) -> Result<Outcome, ClientError> {
-        self.post("downloads", request, key).await
-    }
-
-    /// Adds elements of one satellite.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub async fn add_elements(
-        &self,
-        request: &ElementsRequest,
-        key: &IdempotencyKey,
-    ) -> Result<ElementsAdded, ClientError> {
-        self.post("elements", request, key).await
-    }
-
     /// Has the sources of elements asked, as far as they allow; the answer comes after theirs.
     ///
     /// # Errors
     /// [`ClientError`].
     pub async fn fetch_elements(&self, key: &IdempotencyKey) -> Result<FetchReport, ClientError> {
-        self.write(Method::POST, "elements/fetch", &Nothing {}, key, FETCH_PATIENCE).await
-    }
-
-    /// Says that this machine's clock is right.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub async fn vouch_clock(&self, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
-        self.post("clock/vouch", &Nothing {}, key).await
-    }
-
-    /// Hands a plan over; it is not armed.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub async fn add_plan(&self, plan: &PlanText, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
-        self.post("plans", plan, key).await
-    }
-
-    /// Takes a plan out of use.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub async fn withdraw_plan(&self, name: &str, key: &IdempotencyKey) -> Result<Outcome, ClientError> {
-        self.delete(&format!("plans/{}", segment(name)), key).await
+        self.write(Method::POST, FETCH.path, &Nothing {}, key, FETCH_PATIENCE).await
     }
 
     /// Chooses the pass in which this instant lies for a plan.
@@ -278,7 +192,7 @@ impl Client {
         at: Time,
         key: &IdempotencyKey,
     ) -> Result<Outcome, ClientError> {
-        self.post(&format!("plans/{}/attach", segment(name)), &AttachRequest { at }, key).await
+        self.post(&ATTACH.of(&name), &AttachRequest { at }, key).await
     }
 
     /// Takes that choice back.
@@ -291,7 +205,7 @@ impl Client {
         at: Time,
         key: &IdempotencyKey,
     ) -> Result<Outcome, ClientError> {
-        self.post(&format!("plans/{}/detach", segment(name)), &AttachRequest { at }, key).await
+        self.post(&DETACH.of(&name), &AttachRequest { at }, key).await
     }
 
     /// The file of an image; `None` when what carries the tag `known` is still the newest.
@@ -299,7 +213,7 @@ impl Client {
     /// # Errors
     /// [`ClientError`].
     pub async fn image_file(&self, id: u64, known: Option<&str>) -> Result<Option<ImageFile>, ClientError> {
-        let url = self.url(&format!("images/{id}/file"), &Filter::new())?;
+        let url = self.url(&IMAGE_FILE.of(&id), &Filter::new())?;
         let mut request = self.http.get(url.clone()).header(ACCEPT, "image/jpeg");
         if let Some(known) = known.and_then(|tag| HeaderValue::try_from(tag).ok()) {
             request = request.header(IF_NONE_MATCH, known);

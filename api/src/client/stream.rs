@@ -14,9 +14,11 @@ use tokio_tungstenite::tungstenite::handshake::{client::generate_key, derive_acc
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 use tokio_tungstenite::tungstenite::{Error, Message};
 
+use super::operation::Operation;
 use super::{Client, ClientError, Filter, timers};
 use crate::{StreamMessage, StreamRequest, Topic};
 
+pub(super) const STREAM: Operation = Operation::get("stream");
 /// The server says something every 15 s at least; a longer silence means that the line is dead.
 const SILENCE: Duration = Duration::from_secs(40);
 /// A handshake takes no longer.
@@ -148,7 +150,7 @@ impl Client {
     }
 
     async fn open_stream(self, filter: Filter) -> Result<Socket, ClientError> {
-        let url = self.url("stream", &filter)?;
+        let url = self.url(STREAM.path, &filter)?;
         let key = generate_key();
         let request = self
             .http

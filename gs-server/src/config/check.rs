@@ -153,6 +153,18 @@ impl Config {
             format!("{} hours", self.people.approval_h),
             "Give 0.01 to 168.",
         )?;
+        ensure(
+            (10.0..=1440.0).contains(&self.people.session_idle_min),
+            "people.session_idle_min",
+            format!("{} minutes", self.people.session_idle_min),
+            "Give 10 to 1440.",
+        )?;
+        ensure(
+            (0.5..=168.0).contains(&self.people.session_max_h),
+            "people.session_max_h",
+            format!("{} hours", self.people.session_max_h),
+            "Give 0.5 to 168.",
+        )?;
         for (key, text) in [
             ("station.call_sign", &self.station.call_sign),
             ("station.licence_text", &self.station.licence_text),

@@ -239,11 +239,15 @@ pub struct PeopleSection {
     pub two_person: TwoPerson,
     /// How long the second person has, hours: 0.01 to 168. Default 1.
     pub approval_h: f64,
+    /// A session that nobody uses ends after so many minutes: 10 to 1440. Default 30.
+    pub session_idle_min: f64,
+    /// Every session ends after so many hours: 0.5 to 168. Default 12.
+    pub session_max_h: f64,
 }
 
 impl Default for PeopleSection {
     fn default() -> Self {
-        Self { two_person: TwoPerson::Off, approval_h: 1.0 }
+        Self { two_person: TwoPerson::Off, approval_h: 1.0, session_idle_min: 30.0, session_max_h: 12.0 }
     }
 }
 

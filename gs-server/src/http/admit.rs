@@ -60,7 +60,7 @@ fn log_in_first() -> Failure {
     Failure::new(
         ProblemKind::LoginRequired,
         "Log in at /login, or send 'Authorization: Bearer TOKEN' with a token of yours or the one of the server's token \
-         file. A session that is not used for 12 h, or is 7 days old, has ended.",
+         file. A session that was not used for a while, or is too old ([people] session_idle_min, session_max_h), has ended.",
     )
 }
 
@@ -184,15 +184,26 @@ pub(super) fn cookie(headers: &HeaderMap, https: bool) -> Option<String> {
     found.next().is_none().then(|| value.to_owned())
 }
 
-/// Where the request came from. A proxy with TLS on this machine tells it: the last address is the one it saw itself.
+/// Where the request came from. Proxies with TLS on this machine are believed, and nobody else: each appends whom it saw
+/// itself, so the last one that is not of this machine counts. What stands before it was said by whoever asks.
 fn address(app: &App, request: &Request) -> Option<IpAddr> {
     let peer = request.extensions().get::<ConnectInfo<SocketAddr>>()?.0.ip();
-    if https(app) && peer.to_canonical().is_loopback() {
-        let told = request.headers().get_all(FORWARDED_FOR).iter().next_back();
-        let last = told.and_then(|value| value.to_str().ok()?.rsplit(',').next());
-        if let Some(Ok(address)) = last.map(|last| last.trim().parse()) {
-            return Some(address);
-        }
+    if !https(app) {
+        return Some(peer);
     }
-    Some(peer)
+    let mut nearest = peer;
+    let told = request.headers().get_all(FORWARDED_FOR).iter().rev();
+    let mut hops = told.flat_map(|value| value.to_str().unwrap_or("?").rsplit(','));
+    while nearest.to_canonical().is_loopback() {
+        let Some(Some(before)) = hops.next().map(hop) else { break };
+        nearest = before;
+    }
+    Some(nearest)
+}
+
+/// Proxies write an address, some with its port.
+fn hop(text: &str) -> Option<IpAddr> {
+    let text = text.trim();
+    let with_port = || text.parse::<SocketAddr>().map(|address| address.ip());
+    text.parse().or_else(|_| with_port()).ok()
 }

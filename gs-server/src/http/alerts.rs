@@ -2,7 +2,6 @@
 
 use api::{
     AlertNote, AlertView, AssignRequest, Nothing, Page, ProblemKind, ShelveRequest, TargetTested, TargetView,
-    Time,
 };
 use axum::Json;
 use axum::extract::State;
@@ -10,29 +9,17 @@ use axum::http::HeaderValue;
 use axum::response::{IntoResponse as _, Response};
 use mission::alert::ActionError;
 use mission::{AlertId, Level, UtcUs};
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::App;
-use super::extract::{Id, Name, Query, during, page, paged, whole};
+use super::extract::{Id, Name, Query, list_query, paged, whole};
 use super::problem::Failure;
 use super::write::{IDEMPOTENCY_REPLAYED, Write};
 use crate::alerts::{Action, ActionFailure, TestFailure, view};
 use crate::config::TargetKind;
 use crate::storage::AlertQuery;
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Asked {
-    state: Option<String>,
-    satellite: Option<String>,
-    level: Option<String>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
-}
+list_query! { Asked { state: String, satellite: String, level: String } }
 
 pub(super) async fn list(
     State(app): State<App>,
@@ -49,12 +36,13 @@ pub(super) async fn list(
         }
     };
     let level = asked.level.as_deref().map_or(Ok(Level::Normal), str::parse);
+    let (during, page) = (asked.during()?, asked.page()?);
     let query = AlertQuery {
         open,
         satellite: asked.satellite,
         level: level.map_err(|error: mission::level::UnknownLevel| wrong("level", error.to_string()))?,
-        during: during(asked.start, asked.stop)?,
-        page: page(asked.after, asked.before, asked.limit)?,
+        during,
+        page,
     };
     let alerts = app.state.store.alerts(&query).await?;
     let views = alerts.iter().map(view).collect();

@@ -1,29 +1,23 @@
 //! `/api/v1/approvals`: what waits for a second person. `/api/v1/transmissions`: who answered for what.
 
-use api::{ApprovalView, ApproveRequest, Outcome, Page, RefuseRequest, Time, TransmissionView};
+use api::{ApprovalView, ApproveRequest, Outcome, Page, RefuseRequest, TransmissionView};
 use axum::Json;
 use axum::extract::State;
-use serde::Deserialize;
 
 use super::App;
 use super::admit::may;
-use super::extract::{Id, ListQuery, Query, during, number, page, paged, small, time};
+use super::extract::{Id, ListQuery, Query, list_query, number, paged, small, time};
 use super::problem::Failure;
 use super::release::{release, remake};
 use super::write::Write;
 use crate::people::{Caller, Decision, People, Right};
 use crate::storage::{ApprovalRow, TransmissionRow};
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Which {
-    /// `true`: only what still waits.
-    open: Option<bool>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
+list_query! {
+    Which {
+        /// `true`: only what still waits.
+        open: bool,
+    }
 }
 
 pub(super) async fn list(
@@ -31,8 +25,8 @@ pub(super) async fn list(
     Query(asked): Query<Which>,
 ) -> Result<Json<Page<ApprovalView>>, Failure> {
     let people = &app.state.people;
-    let page = page(asked.after, asked.before, asked.limit)?;
-    let during = during(asked.start, asked.stop)?;
+    let page = asked.page()?;
+    let during = asked.during()?;
     let rows = people.approvals(asked.open.unwrap_or(false), &during, &page).await?;
     let views = rows.iter().map(|row| view(people, row)).collect();
     Ok(Json(paged(views, &page, |approval: &ApprovalView| approval.id)))

@@ -1,47 +1,34 @@
 //! `/api/v1/commands`: telecommands, asked for, looked at, withdrawn.
 
 use api::{
-    CommandRequest, CommandView, GateWord, Nothing, Page, Problem, ProblemKind, StageView, Time, telecommand,
+    CommandRequest, CommandView, GateWord, Nothing, Page, Problem, ProblemKind, StageView, telecommand,
 };
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use mission::{CommandId, CommandIntent, Gate, Intent, LinkId, Stage, UtcUs};
-use serde::Deserialize;
 
 use super::App;
-use super::extract::{Id, Query, number, page, paged, satellite, scope, small, time};
+use super::extract::{Id, Query, list_query, number, paged, satellite, scope, small, time};
 use super::problem::Failure;
 use super::write::Write;
 use crate::plan::condition_of;
 use crate::storage::{CommandLife, CommandQuery, CommandRow, StageRow, StoreError};
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Asked {
-    satellite: Option<String>,
-    station: Option<String>,
-    link: Option<String>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    key: Option<String>,
-    stage: Option<String>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
-}
+list_query! { Asked { satellite: String, station: String, link: String, key: String, stage: String } }
 
 pub(super) async fn list(
     State(app): State<App>,
     Query(asked): Query<Asked>,
 ) -> Result<Json<Page<CommandView>>, Failure> {
-    let stage = asked.stage.map(|word| word.parse::<Stage>()).transpose();
+    let stage = asked.stage.as_deref().map(str::parse::<Stage>).transpose();
+    let page = asked.page()?;
     let query = CommandQuery {
-        scope: scope(&asked.satellite, &asked.station, &asked.link, (asked.start, asked.stop))?,
+        scope: scope(&asked.satellite, &asked.station, &asked.link, asked.during()?),
         key: asked.key,
         stage: stage
             .map_err(|error| Failure::field(ProblemKind::BadParameter, "stage", error.to_string()))?,
-        page: page(asked.after, asked.before, asked.limit)?,
+        page,
     };
     let commands = app.state.store.commands(&query).await?;
     let views = commands

@@ -1,32 +1,19 @@
 //! `GET /api/v1/events`, `/api/v1/limits` and `/api/v1/audit`: what happened, which values are out of bounds, and who
 //! did what.
 
-use api::{AuditView, EventView, LimitView, Page, ProblemKind, Time};
+use api::{AuditView, EventView, LimitView, Page, ProblemKind};
 use axum::Json;
 use axum::extract::State;
 use mission::Level;
 use mission::record::EventKind;
-use serde::Deserialize;
 
 use super::App;
-use super::extract::{Query, Within, during, number, page, paged, scope, time, whole};
+use super::extract::{Query, Within, list_query, number, paged, scope, time, whole};
 use super::problem::Failure;
 use crate::storage::{EventQuery, StoredEvent};
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Asked {
-    satellite: Option<String>,
-    station: Option<String>,
-    link: Option<String>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    key: Option<String>,
-    kind: Option<String>,
-    level: Option<String>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
+list_query! {
+    Asked { satellite: String, station: String, link: String, key: String, kind: String, level: String }
 }
 
 pub(super) async fn list(
@@ -36,15 +23,16 @@ pub(super) async fn list(
     let wrong = |field, message: String| Failure::field(ProblemKind::BadParameter, field, message);
     let level = asked.level.as_deref().map_or(Ok(Level::Normal), str::parse);
     let kinds = asked.kind.as_deref().map_or(Ok(Vec::new()), kinds);
+    let page = asked.page()?;
     let query = EventQuery {
-        scope: scope(&asked.satellite, &asked.station, &asked.link, (asked.start, asked.stop))?,
+        scope: scope(&asked.satellite, &asked.station, &asked.link, asked.during()?),
         key: asked.key,
         kinds: kinds.map_err(|word| {
             let known: Vec<&str> = EventKind::ALL.iter().map(|kind| kind.name()).collect();
             wrong("kind", format!("'{word}' is no kind of event; there are {}", known.join(", ")))
         })?,
         level: level.map_err(|error: mission::level::UnknownLevel| wrong("level", error.to_string()))?,
-        page: page(asked.after, asked.before, asked.limit)?,
+        page,
     };
     let events = app.state.store.events(&query).await?;
     let views = events.iter().map(view).collect();
@@ -79,22 +67,14 @@ pub(super) async fn limits(
     Ok(Json(whole(views.collect())))
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct AuditAsked {
-    start: Option<Time>,
-    stop: Option<Time>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
-}
+list_query! { AuditAsked {} }
 
 pub(super) async fn audit(
     State(app): State<App>,
     Query(asked): Query<AuditAsked>,
 ) -> Result<Json<Page<AuditView>>, Failure> {
-    let page = page(asked.after, asked.before, asked.limit)?;
-    let rows = app.state.store.audit(&during(asked.start, asked.stop)?, &page).await?;
+    let page = asked.page()?;
+    let rows = app.state.store.audit(&asked.during()?, &page).await?;
     let views = rows.into_iter().map(|row| AuditView {
         id: number(row.id),
         station: row.station,

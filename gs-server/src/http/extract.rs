@@ -63,18 +63,38 @@ impl<T: DeserializeOwned> FromRequestParts<App> for Query<T> {
     }
 }
 
-/// Whose, and which part: the parameters that every list takes.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ListQuery {
-    satellite: Option<String>,
-    station: Option<String>,
-    link: Option<String>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
+/// The parameters of a list: these, and those that every list takes (from when until when, and which part).
+macro_rules! list_query {
+    ($(#[$meta:meta])* $name:ident { $($(#[$about:meta])* $field:ident: $type:ty),* $(,)? }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct $name {
+            $($(#[$about])* $field: Option<$type>,)*
+            start: Option<api::Time>,
+            stop: Option<api::Time>,
+            after: Option<i64>,
+            before: Option<i64>,
+            limit: Option<u32>,
+        }
+
+        impl $name {
+            pub(super) fn during(&self) -> Result<$crate::storage::During, $crate::http::problem::Failure> {
+                $crate::http::extract::during(self.start, self.stop)
+            }
+
+            pub(super) fn page(&self) -> Result<$crate::storage::Page, $crate::http::problem::Failure> {
+                $crate::http::extract::page(self.after, self.before, self.limit)
+            }
+        }
+    };
+}
+
+pub(super) use list_query;
+
+list_query! {
+    /// Whose, and which part.
+    ListQuery { satellite: String, station: String, link: String }
 }
 
 /// Rows of a page, when nobody says how many.
@@ -96,11 +116,7 @@ pub(super) fn limit(asked: Option<u32>) -> Result<u32, Failure> {
 
 impl ListQuery {
     pub(super) fn scope(&self) -> Result<storage::Scope, Failure> {
-        scope(&self.satellite, &self.station, &self.link, (self.start, self.stop))
-    }
-
-    pub(super) fn page(&self) -> Result<storage::Page, Failure> {
-        page(self.after, self.before, self.limit)
+        Ok(scope(&self.satellite, &self.station, &self.link, self.during()?))
     }
 }
 
@@ -132,14 +148,9 @@ pub(super) fn scope(
     satellite: &Option<String>,
     station: &Option<String>,
     link: &Option<String>,
-    (start, stop): (Option<Time>, Option<Time>),
-) -> Result<storage::Scope, Failure> {
-    Ok(storage::Scope {
-        satellite: satellite.clone(),
-        station: station.clone(),
-        link: link.clone(),
-        during: during(start, stop)?,
-    })
+    during: storage::During,
+) -> storage::Scope {
+    storage::Scope { satellite: satellite.clone(), station: station.clone(), link: link.clone(), during }
 }
 
 pub(super) fn page(

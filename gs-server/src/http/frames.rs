@@ -1,39 +1,27 @@
 //! `GET /api/v1/frames` and `/api/v1/frames/{id}`: what was heard, byte for byte.
 
-use api::{FrameView, PacketView, Page, ReceptionView, Time};
+use api::{FrameView, PacketView, Page, ReceptionView};
 use axum::Json;
 use axum::extract::State;
 use protocol::{DownFrame, Downlink};
-use serde::Deserialize;
 
 use super::App;
-use super::extract::{Id, Query, number, page, paged, scope, small, time};
+use super::extract::{Id, Query, list_query, number, paged, scope, small, time};
 use super::problem::Failure;
 use super::receptions;
 use crate::storage::{FrameQuery, FrameRow, ReceptionRow};
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Asked {
-    satellite: Option<String>,
-    station: Option<String>,
-    link: Option<String>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
-    packet_type: Option<u8>,
-}
+list_query! { Asked { satellite: String, station: String, link: String, packet_type: u8 } }
 
 pub(super) async fn list(
     State(app): State<App>,
     Query(asked): Query<Asked>,
 ) -> Result<Json<Page<FrameView>>, Failure> {
+    let page = asked.page()?;
     let query = FrameQuery {
-        scope: scope(&asked.satellite, &asked.station, &asked.link, (asked.start, asked.stop))?,
+        scope: scope(&asked.satellite, &asked.station, &asked.link, asked.during()?),
         packet_type: asked.packet_type,
-        page: page(asked.after, asked.before, asked.limit)?,
+        page,
     };
     let heard = app.state.store.frames(&query).await?;
     let ids: Vec<i64> = heard.iter().map(|heard| heard.frame.id).collect();

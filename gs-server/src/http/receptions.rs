@@ -5,10 +5,9 @@ use axum::Json;
 use axum::extract::State;
 use mission::UtcUs;
 use mission::reception::{Ear, Receiver};
-use serde::Deserialize;
 
 use super::App;
-use super::extract::{Query, during, number, page, paged, satellite, small, time, whole};
+use super::extract::{Query, list_query, number, paged, satellite, small, time, whole};
 use super::problem::Failure;
 use super::write::Write;
 use crate::ingest::formats::{self, Context, Format, Item, RECEPTION_MAX};
@@ -18,19 +17,7 @@ use crate::storage::{OutsideQuery, OutsideRow};
 /// What a reception may be.
 const KINDS: [&str; 4] = ["frame", "repairable", "damaged", "detection"];
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Asked {
-    satellite: Option<String>,
-    source: Option<String>,
-    kind: Option<String>,
-    original: Option<bool>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
-}
+list_query! { Asked { satellite: String, source: String, kind: String, original: bool } }
 
 pub(super) async fn list(
     State(app): State<App>,
@@ -46,13 +33,9 @@ pub(super) async fn list(
     if asked.kind.as_deref().is_some_and(|kind| !KINDS.contains(&kind)) {
         return wrong("kind", &KINDS.join(", "));
     }
-    let query = OutsideQuery {
-        satellite: asked.satellite,
-        source: asked.source,
-        kind: asked.kind,
-        during: during(asked.start, asked.stop)?,
-        page: page(asked.after, asked.before, asked.limit)?,
-    };
+    let (during, page) = (asked.during()?, asked.page()?);
+    let query =
+        OutsideQuery { satellite: asked.satellite, source: asked.source, kind: asked.kind, during, page };
     let rows = app.state.store.outside(&query).await?;
     let views = rows.into_iter().map(|(id, row)| {
         let original = row.original.clone().filter(|_| asked.original == Some(true));

@@ -13,9 +13,6 @@ use super::problem::Failure;
 use super::write::Write;
 use crate::people::{Caller, Right, Secret, Welcome};
 
-/// A browser keeps the cookie for as long as the longest session.
-const COOKIE_AGE_S: u64 = 7 * 24 * 3600;
-
 /// Who asks. A session that is old gets a new cookie here.
 pub(super) async fn get(
     State(app): State<App>,
@@ -97,11 +94,13 @@ async fn gone(app: &App) -> Result<Response, Failure> {
 /// Who it is, with the cookie.
 fn answer(app: &App, caller: &Caller, token: &Secret) -> Response {
     let mut response = Json(view(app, caller, Some(token.reveal()))).into_response();
-    set_cookie(&mut response, app, token.reveal(), COOKIE_AGE_S);
+    // For as long as the longest session.
+    let age_s = app.state.people.settings().session.max_us / 1_000_000;
+    set_cookie(&mut response, app, token.reveal(), age_s);
     response
 }
 
-fn set_cookie(response: &mut Response, app: &App, value: &str, age_s: u64) {
+fn set_cookie(response: &mut Response, app: &App, value: &str, age_s: i64) {
     let https = app.state.people.settings().https;
     let secure = if https { "; Secure" } else { "" };
     let name = cookie_name(https);

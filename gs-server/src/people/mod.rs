@@ -41,6 +41,7 @@ pub use caller::{Caller, Credential};
 pub use password::{PASSWORD_MAX, PASSWORD_MIN};
 pub use right::{NoSuchRight, NoSuchRole, Right, Rights, Role};
 pub use secret::Secret;
+pub use session::SessionRules;
 pub use tokens::TokenWanted;
 pub use users::{UserChanged, UserWanted, Welcome};
 
@@ -57,6 +58,8 @@ pub struct PeopleSettings {
     pub two_person: bool,
     /// How long a second person has, microseconds.
     pub approval_us: i64,
+    /// When sessions end by themselves.
+    pub session: SessionRules,
     /// Browsers come over TLS: cookies are marked so, and origins must begin with `https`.
     pub https: bool,
     /// Whether one may look without logging in; `None`: on loopback, as long as there is no user.

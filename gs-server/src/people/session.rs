@@ -14,18 +14,37 @@ use crate::storage::{PeopleChange, SessionRow, StoreError, UserRow};
 
 const SECOND_US: i64 = 1_000_000;
 const HOUR_US: i64 = 3600 * SECOND_US;
-/// A session that nobody uses ends.
-const IDLE_US: i64 = 12 * HOUR_US;
-/// And every one ends after that.
-pub(super) const ABSOLUTE_US: i64 = 7 * 24 * HOUR_US;
 /// A token is exchanged when it is so old.
 const ROTATE_US: i64 = HOUR_US;
 /// The old one is good for so long after the new one was seen.
 const OVERLAP_US: i64 = 60 * SECOND_US;
-/// When a session was used is written down to so much.
-const SEEN_US: i64 = 300 * SECOND_US;
+/// When a session was used is written down to this part of its idle time.
+const SEEN_PARTS: i64 = 10;
 /// Sessions that a user may have; the oldest makes room.
 const SESSIONS_MAX: usize = 16;
+
+/// When sessions end by themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SessionRules {
+    /// One that nobody uses ends after so long, microseconds.
+    pub idle_us: i64,
+    /// Every one ends after so long, microseconds.
+    pub max_us: i64,
+}
+
+impl Default for SessionRules {
+    fn default() -> Self {
+        Self { idle_us: HOUR_US / 2, max_us: 12 * HOUR_US }
+    }
+}
+
+impl SessionRules {
+    fn is_open(self, row: &SessionRow, now: i64) -> bool {
+        row.ended_at_us.is_none()
+            && now < row.created_at_us.saturating_add(self.max_us)
+            && now < row.seen_at_us.saturating_add(self.idle_us)
+    }
+}
 
 impl People {
     /// Lets somebody in who knows the password: the token for the cookie, and who it is.
@@ -78,7 +97,7 @@ impl People {
             ended_why: None,
         };
         let audit = self.audit(&user.name, "session.begin", format!("session {}", row.id));
-        let caller = caller(&row, &user);
+        let caller = self.session_of_user(&row, &user);
         changes.push(PeopleChange::Session(row));
         self.change(&changes, audit).await?;
         Ok((token, caller))
@@ -109,7 +128,8 @@ impl People {
         let hashed = hash(token);
         let Some(row) = self.0.store.session(&hashed).await? else { return Ok(None) };
         let now = self.now_us();
-        if !is_open(&row, now) {
+        let rules = self.settings().session;
+        if !rules.is_open(&row, now) {
             return Ok(None);
         }
         let Some(user) = self.0.store.user(&row.user_name).await?.filter(|user| !user.disabled) else {
@@ -123,10 +143,10 @@ impl People {
             return Err(PeopleError::SessionReplayed);
         }
         let settles = !is_previous && row.previous_hash.is_some() && row.previous_until_us.is_none();
-        if settles || now - row.seen_at_us > SEEN_US {
+        if settles || now - row.seen_at_us > rules.idle_us / SEEN_PARTS {
             self.note_use(&row.id, settles, now).await;
         }
-        Ok(Some(caller(&row, &user)))
+        Ok(Some(self.session_of_user(&row, &user)))
     }
 
     /// Writes down that a session is used, and that the new token has arrived.
@@ -153,7 +173,8 @@ impl People {
         let hashed = hash(token);
         let _one_after_the_other = self.0.changing.lock().await;
         let now = self.now_us();
-        let row = self.0.store.session(&hashed).await?.filter(|row| is_open(row, now));
+        let row =
+            self.0.store.session(&hashed).await?.filter(|row| self.settings().session.is_open(row, now));
         // A previous token whose successor never arrived is exchanged once more.
         let is_due = |row: &SessionRow| {
             now - row.rotated_at_us >= ROTATE_US
@@ -210,26 +231,24 @@ impl People {
     /// The caller of a session by its name in records, if it is open.
     pub(super) async fn session_caller(&self, id: &str) -> Result<Option<Caller>, StoreError> {
         let row = self.0.store.session_by_id(id).await?;
-        let Some(row) = row.filter(|row| is_open(row, self.now_us())) else { return Ok(None) };
+        let Some(row) = row.filter(|row| self.settings().session.is_open(row, self.now_us())) else {
+            return Ok(None);
+        };
         let user = self.0.store.user(&row.user_name).await?.filter(|user| !user.disabled);
-        Ok(user.map(|user| caller(&row, &user)))
+        Ok(user.map(|user| self.session_of_user(&row, &user)))
     }
-}
 
-fn caller(row: &SessionRow, user: &UserRow) -> Caller {
-    let role = role(user);
-    Caller {
-        credential: Credential::Session(row.id.clone()),
-        principal: Some(Principal::new(&user.name)),
-        person: Some(user.name.clone()),
-        role: Some(role),
-        rights: role.rights(),
-        expires_at_us: Some(row.created_at_us + ABSOLUTE_US),
+    fn session_of_user(&self, row: &SessionRow, user: &UserRow) -> Caller {
+        let role = role(user);
+        Caller {
+            credential: Credential::Session(row.id.clone()),
+            principal: Some(Principal::new(&user.name)),
+            person: Some(user.name.clone()),
+            role: Some(role),
+            rights: role.rights(),
+            expires_at_us: Some(row.created_at_us.saturating_add(self.settings().session.max_us)),
+        }
     }
-}
-
-fn is_open(row: &SessionRow, now: i64) -> bool {
-    row.ended_at_us.is_none() && now < row.created_at_us + ABSOLUTE_US && now < row.seen_at_us + IDLE_US
 }
 
 fn ended(row: SessionRow, at_us: i64, why: &str) -> SessionRow {

@@ -89,8 +89,8 @@ fn satellite_that_comes_late_is_found_late() {
                 let error_hz = 250.0 + doppler::downlink_shift_hz(435e6, look.range_rate_km_s);
                 writeln!(
                     lines,
-                    "{{\"station\":\"{name}\",\"station_location\":[{latitude},{longitude}],\"frequency\":435,\
-                     \"frequency_error\":{error_hz:.1},\"usec_time\":{}}}",
+                    "tinygs/me/{name}/tele/rx {{\"station_location\":[{latitude},{longitude}],\"frequency\":435,\
+                     \"frequency_error\":{error_hz:.1},\"usec_time\":{},\"data\":\"AAAA\"}}",
                     at.unix_us()
                 )
                 .unwrap();

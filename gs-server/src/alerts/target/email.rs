@@ -41,6 +41,11 @@ impl Email {
         })
     }
 
+    /// The account at the mail server.
+    pub(super) fn user(&self) -> Option<&str> {
+        self.user.as_deref()
+    }
+
     pub(super) async fn send(&self, letter: &Letter, password: Option<&str>) -> Result<(), SendError> {
         let message = self.message(letter)?;
         let tls = || {

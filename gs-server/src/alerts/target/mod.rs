@@ -4,6 +4,7 @@
 
 mod chat;
 mod email;
+mod hide;
 mod matrix;
 mod request;
 pub(crate) mod secret;
@@ -121,12 +122,20 @@ impl Target {
                 .map(String::as_str)
                 .ok_or_else(|| SendError::Secret("it has no secret".to_owned()))
         };
-        match &self.way {
+        let sent = match &self.way {
             Way::Email(email) => email.send(letter, secret.as_deref().map(String::as_str)).await,
             Way::Webhook(url) => webhook::send(url, letter, needed()?).await,
             Way::Matrix(matrix) => matrix.send(letter, needed()?).await,
             Way::Slack => chat::slack(letter, needed()?).await,
             Way::Discord => chat::discord(letter, needed()?).await,
+        };
+        let user = match &self.way {
+            Way::Email(email) => email.user(),
+            _ => None,
+        };
+        match &secret {
+            Some(secret) => sent.map_err(|error| hide::hide(error, secret, user)),
+            None => sent,
         }
     }
 }

@@ -53,7 +53,7 @@ pub(in crate::http) struct Doc {
     pub(in crate::http) path: &'static str,
     tag: &'static str,
     id: &'static str,
-    summary: &'static str,
+    pub(in crate::http) summary: &'static str,
     more: &'static str,
     pub(in crate::http) params: Vec<Param>,
     body: Option<String>,

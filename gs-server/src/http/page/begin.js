@@ -26,6 +26,8 @@ export async function beginPage({ history, started, refresh, event, status, pain
       open() {
         model.live = true;
         model.awaySince = null;
+        // Somebody may have logged in again, here or in another tab.
+        if (model.sessionOver) refreshSession().then(paint).catch(() => {});
         refresh();
         paint();
       },
@@ -33,6 +35,8 @@ export async function beginPage({ history, started, refresh, event, status, pain
         model.live = false;
         model.awaySince ??= Date.now();
         paint();
+        // A stream ends with its session, and the page says so instead of calling the server away.
+        refreshSession().then(paint).catch(() => {});
       },
       reset,
     });

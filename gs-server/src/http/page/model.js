@@ -8,6 +8,7 @@ export const model = {
   receivedAt: 0, // performance.now() when it came
   live: false, // the stream is open
   awaySince: null, // wall time when it broke
+  sessionOver: false, // who was here must log in again
   satellite: null, // name of the satellite shown
 };
 

@@ -5,7 +5,9 @@ import { model } from "./model.js";
 
 export function paintNotice() {
   const lines = [];
-  if (model.awaySince !== null) {
+  if (model.sessionOver) {
+    lines.push("Your session has ended: nobody used it for a while, or it was too old. Log in (above, or in another tab) and this page goes on. What you see is old.");
+  } else if (model.awaySince !== null) {
     lines.push(`The server is away since ${clock(model.awaySince)} UTC (this machine's clock). What you see is old. Trying again by itself.`);
   }
   const { station } = model;
@@ -19,5 +21,5 @@ export function paintNotice() {
   document.body.classList.toggle("old-data", model.awaySince !== null);
   const connection = byId("connection");
   connection.classList.toggle("away", !model.live);
-  say(connection, model.live ? "● live" : model.awaySince === null ? "connecting" : "○ server away");
+  say(connection, model.live ? "● live" : model.awaySince === null ? "connecting" : model.sessionOver ? "○ logged out" : "○ server away");
 }

@@ -2,16 +2,20 @@
 // that goes with each write.
 import { forgetSession, get, hasToken, keepSession, post, remove } from "./api.js";
 import { byId, say } from "./dom.js";
+import { model } from "./model.js";
 
 // The session's cookie is exchanged now and then, when it is asked for.
-const AGAIN_MS = 10 * 60 * 1000;
+// An open page is in use: more often than the shortest idle time that can be set.
+const AGAIN_MS = 4 * 60 * 1000;
 
 /** True when there is somebody, or looking needs nobody. */
 export async function refreshSession() {
   const session = await get("session");
   keepSession(session);
   paintSession(session);
-  return session.rights.includes("look") || hasToken();
+  const isThere = session.rights.includes("look") || hasToken();
+  model.sessionOver = !isThere;
+  return isThere;
 }
 
 function paintSession(session) {

@@ -97,6 +97,111 @@ async fn a_write_under_the_same_key_is_done_once_and_refusals_are_problems() {
     assert!(nobody.version().await.unwrap_err().is_temporary());
 }
 
+/// One call of each operation that the tests above do not have, against a real server.
+#[tokio::test]
+async fn people_alerts_reports_rehearsals_and_receptions_are_understood() {
+    let (bench, address) = Bench::on_a_socket().await;
+    let (client, all, new) = (client(address), Filter::new(), IdempotencyKey::fresh);
+    let kind = |error: ClientError| error.kind().unwrap();
+    let body = |value: serde_json::Value| value.to_string();
+    // People.
+    assert_eq!(client.session().await.unwrap().name.as_deref(), Some("local"));
+    assert!(client.first_link(&new()).await.unwrap().link.starts_with("/welcome#code="));
+    let wanted: api::UserRequest =
+        serde_json::from_str(&body(json!({"name": "otto", "role": "operator"}))).unwrap();
+    assert_eq!(client.add_user(&wanted, &new()).await.unwrap().name, "otto");
+    let change = api::UserChange { call_sign: Some("DL1OTT".to_owned()), ..Default::default() };
+    assert_eq!(
+        client.change_user("otto", &change, &new()).await.unwrap().call_sign.as_deref(),
+        Some("DL1OTT")
+    );
+    assert!(client.user_link("otto", &new()).await.unwrap().link.starts_with("/welcome#code="));
+    assert_eq!(client.users(&all).await.unwrap().items.len(), 1);
+    let wanted = json!({"name": "script", "scopes": ["look"], "days": 3, "owner": "otto"});
+    let wanted: api::TokenRequest = serde_json::from_value(wanted).unwrap();
+    let made = client.new_token(&wanted, &new()).await.unwrap();
+    let machine = Client::new(&format!("http://{address}"), Some(&made.secret)).unwrap();
+    assert_eq!(machine.session().await.unwrap().rights, ["look"]);
+    assert_eq!(client.tokens(&all).await.unwrap().items[0].name, "script");
+    client.revoke_token("script", &new()).await.unwrap();
+    assert_eq!(kind(machine.session().await.unwrap_err()), ProblemKind::TokenRefused);
+    // What waits for a second person: nothing here.
+    assert!(client.approvals(&all.clone().with("open", true)).await.unwrap().items.is_empty());
+    assert!(client.transmissions(&all).await.unwrap().items.is_empty());
+    assert_eq!(kind(client.approval(1).await.unwrap_err()), ProblemKind::NotFound);
+    let yes: api::ApproveRequest = serde_json::from_value(json!({"digest": "00"})).unwrap();
+    assert_eq!(kind(client.approve(1, &yes, &new()).await.unwrap_err()), ProblemKind::NotFound);
+    let no = api::RefuseRequest::default();
+    assert_eq!(kind(client.refuse(1, &no, &new()).await.unwrap_err()), ProblemKind::NotFound);
+    // Alerts.
+    assert!(client.alerts(&all.clone().with("state", "all")).await.unwrap().items.is_empty());
+    assert!(client.alert_targets().await.unwrap().items.is_empty());
+    let note = api::AlertNote { note: None };
+    let shelve: api::ShelveRequest =
+        serde_json::from_value(json!({"until": "2026-12-02T06:00:00Z"})).unwrap();
+    let assign: api::AssignRequest = serde_json::from_value(json!({"to": "otto"})).unwrap();
+    assert_eq!(kind(client.alert(1).await.unwrap_err()), ProblemKind::NotFound);
+    for refused in [
+        client.acknowledge_alert(1, &note, &new()).await,
+        client.shelve_alert(1, &shelve, &new()).await,
+        client.unshelve_alert(1, &note, &new()).await,
+        client.assign_alert(1, &assign, &new()).await,
+    ] {
+        assert!([404, 409, 422].contains(&kind(refused.unwrap_err()).status()));
+    }
+    assert_eq!(kind(client.test_target("none", &new()).await.unwrap_err()), ProblemKind::UnknownTarget);
+    // Reports.
+    bench.hear(&heartbeat(20.0)).await;
+    bench.frames(1).await;
+    assert_eq!(client.handover(&all).await.unwrap().now.station, "bench");
+    assert!(client.handover_page(&all).await.unwrap().starts_with("<!doctype html>"));
+    assert!(client.handover_text(&all).await.unwrap().starts_with('#'));
+    assert_eq!(client.month_report("2026-11").await.unwrap().month, "2026-11");
+    assert_eq!(kind(client.pass_report(1).await.unwrap_err()).status(), 404);
+    // Rehearsals.
+    assert!(client.rehearsals(&all).await.unwrap().items.is_empty());
+    let wanted: api::RehearsalRequest = serde_json::from_value(json!({"name": "none", "runs": 1})).unwrap();
+    assert!(client.rehearse(&wanted, &new()).await.is_err());
+    assert_eq!(kind(client.rehearsal(1).await.unwrap_err()).status(), 404);
+    assert_eq!(kind(client.cancel_rehearsal(1, &new()).await.unwrap_err()).status(), 404);
+    // What others heard.
+    assert!(client.receptions(&all).await.unwrap().items.is_empty());
+    assert_eq!(client.ears().await.unwrap().next, None);
+    let handed: api::ImportRequest = serde_json::from_value(json!({"items": []})).unwrap();
+    let handed = client.import_receptions(&handed, &new()).await;
+    assert!(handed.is_ok() || kind(handed.unwrap_err()) == ProblemKind::BadArgument);
+    // What is passed on: nothing, to nobody.
+    assert!(client.forwards(&all).await.unwrap().items.is_empty());
+    assert!(client.forward_targets().await.unwrap().items.is_empty());
+    assert_eq!(kind(client.forward(1).await.unwrap_err()).status(), 404);
+    assert!(kind(client.retry_forward(1, &new()).await.unwrap_err()).status() < 500);
+    assert!(kind(client.pause_forwards("none", &new()).await.unwrap_err()).status() < 500);
+    assert!(kind(client.resume_forwards("none", &new()).await.unwrap_err()).status() < 500);
+    // The sky of a station that nobody told its place, and the document.
+    for refused in
+        [client.calendar(&all).await, client.sky_plot(&all).await, client.timeline_plot(&all).await]
+    {
+        assert_eq!(kind(refused.unwrap_err()), ProblemKind::NoPlace);
+    }
+    assert_eq!(client.openapi().await.unwrap()["openapi"], "3.1.0");
+    let at = "2026-11-22T00:00:00Z".parse().unwrap();
+    assert_eq!(kind(client.attach_plan("none", at, &new()).await.unwrap_err()), ProblemKind::UnknownPlan);
+    assert_eq!(kind(client.detach_plan("none", at, &new()).await.unwrap_err()), ProblemKind::UnknownPlan);
+    assert_eq!(kind(client.disarm_plan("none", &new()).await.unwrap_err()), ProblemKind::UnknownPlan);
+    assert_eq!(kind(client.release("pixelsat-1", &new()).await.unwrap_err()), ProblemKind::NothingRuns);
+    assert_eq!(
+        kind(client.confirm_counter("0000", None, &new()).await.unwrap_err()),
+        ProblemKind::UnknownKey
+    );
+    let plan: api::PlanText = serde_json::from_value(
+        json!({"name": "p", "satellite": "other", "attach": {}, "steps": [{"do": "listen", "for_s": 2}]}),
+    )
+    .unwrap();
+    assert!(client.add_plan(&plan, &new()).await.is_err());
+    let elements: api::ElementsRequest = serde_json::from_value(json!({"text": "none"})).unwrap();
+    assert!(client.add_elements(&elements, &new()).await.is_err());
+}
+
 /// Everything in a stream until `count` events have come: which messages by sequence.
 async fn collect(stream: &mut EventStream, until: i64, into: &mut BTreeMap<i64, Vec<&'static str>>) -> u32 {
     let mut losses = 0;

@@ -2,6 +2,7 @@
 
 mod alerts;
 mod client;
+mod doors;
 mod elements;
 mod forwards;
 mod hostile;
@@ -28,6 +29,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::body::{Body, to_bytes};
 use axum::http::{Method, Request, StatusCode, header};
+use migrations::cluster::Database;
 use mission::{
     Clock, LinkConfig, LinkId, MonoUs, Now, Profile, SatelliteConfig, SatelliteId, Source, StationConfig,
     StationId, UtcUs,
@@ -47,8 +49,8 @@ use crate::config::ClockSetting;
 use crate::elements::{ElementsHandle, Wanted};
 use crate::engine::{Engine, EngineInbox, EngineMessage, EngineParts, LinkPort, OsEntropy};
 use crate::hub::Hub;
-use crate::people::{People, PeopleSettings};
-use crate::storage::{Store, StoreOptions};
+use crate::people::{People, PeopleSettings, SessionRules};
+use crate::storage::{Postgres, Store, StoreOptions};
 
 const HOST: &str = "127.0.0.1:8700";
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
@@ -68,6 +70,8 @@ struct Bench {
     /// Until it is started.
     alerts_task: Option<AlertsTask>,
     folder: TempDir,
+    /// Goes away with the bench.
+    _database: Option<Database>,
 }
 
 impl Drop for Bench {
@@ -110,13 +114,33 @@ impl Bench {
         settings: PeopleSettings,
         targets: &str,
     ) -> Self {
+        Self::built_on(None, station, address, settings, targets).await
+    }
+
+    /// A bench that watches itself, whose archive is a PostgreSQL.
+    async fn watching_a_postgres() -> Self {
+        let database = Some(Database::fresh().unwrap());
+        let address = HOST.parse().unwrap();
+        let mut bench = Self::built_on(database, station(), address, people_settings(), "").await;
+        let task = bench.alerts_task.take().unwrap();
+        task.spawn(&crate::lifecycle::Lifecycle::new(&bench.stop));
+        bench
+    }
+
+    async fn built_on(
+        database: Option<Database>,
+        station: StationConfig,
+        address: std::net::SocketAddr,
+        settings: PeopleSettings,
+        targets: &str,
+    ) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(StoreOptions {
             folder: folder.path().join("data"),
             station: Some(station.station.clone()),
             simulated: true,
             max_page_count: None,
-            postgres: None,
+            postgres: database.as_ref().map(|database| Postgres::new(&database.address().unwrap()).unwrap()),
             reserve_bytes: 1 << 16,
         });
         let store = store.await.unwrap();
@@ -197,8 +221,20 @@ impl Bench {
         };
         let router = router(state, AllowedHosts::new(address, &[HOST.to_owned()]));
         let alerts_task = Some(alerts_task);
-        let bench =
-            Self { router, store, hub, inbox, stop, timer, people, hands, alerts, alerts_task, folder };
+        let bench = Self {
+            router,
+            store,
+            hub,
+            inbox,
+            stop,
+            timer,
+            people,
+            hands,
+            alerts,
+            alerts_task,
+            folder,
+            _database: database,
+        };
         // The engine tells that it began; tests count from there.
         for _ in 0..500 {
             if bench.store.last_event_seq().await.unwrap() == 1 {
@@ -297,7 +333,9 @@ impl Bench {
 }
 
 fn people_settings() -> PeopleSettings {
-    PeopleSettings { on_loopback: true, station: "bench".to_owned(), ..PeopleSettings::default() }
+    // Long, so that other tests may let hours pass; those of sessions take the rules that a server has.
+    let session = SessionRules { idle_us: 12 * 3_600_000_000, max_us: 7 * 24 * 3_600_000_000 };
+    PeopleSettings { on_loopback: true, station: "bench".to_owned(), session, ..PeopleSettings::default() }
 }
 
 /// A clock that goes when it is told to.

@@ -95,6 +95,56 @@ fn every_reference_of_the_document_leads_somewhere() {
     assert_eq!(ids.len(), ids.iter().collect::<BTreeSet<_>>().len());
 }
 
+/// The list of all operations in docs/api.md, as the table has them.
+#[test]
+fn the_page_of_the_api_names_every_operation() {
+    const MARKS: [&str; 2] = ["<!-- operations -->\n", "<!-- end -->\n"];
+    let rows = operations().into_iter().map(|row| {
+        let path = row.path.strip_prefix("/api/v1").unwrap();
+        format!("| `{} {path}` | {} |\n", row.method, row.summary)
+    });
+    let rows: String = rows.collect();
+    let wanted = format!("{}| operation | what |\n| --- | --- |\n{rows}{}", MARKS[0], MARKS[1]);
+    let page = std::fs::read_to_string(docs("api.md")).unwrap();
+    let (before, rest) = page.split_once(MARKS[0]).unwrap();
+    let (_, after) = rest.split_once(MARKS[1]).unwrap();
+    let expected = format!("{before}{wanted}{after}");
+    if std::env::var("INSTA_UPDATE").is_ok_and(|how| how == "always") {
+        std::fs::write(docs("api.md"), &expected).unwrap();
+        return;
+    }
+    assert!(
+        page == expected,
+        "run the tests with INSTA_UPDATE=always and look at what changed in docs/api.md"
+    );
+}
+
+/// What a client with a token has no use for: it brings or ends a browser's cookie.
+const OF_BROWSERS: [(&str, &str); 5] = [
+    ("POST", "/api/v1/session"),
+    ("DELETE", "/api/v1/session"),
+    ("POST", "/api/v1/session/end-all"),
+    ("POST", "/api/v1/session/password"),
+    ("POST", "/api/v1/welcome"),
+];
+
+#[test]
+fn every_operation_has_its_method_in_the_typed_client() {
+    let methods: Vec<_> = api::client::Client::operations()
+        .map(|operation| (operation.method, format!("/api/v1/{}", operation.path)))
+        .collect();
+    let known: BTreeSet<_> = methods.iter().map(|(method, path)| (*method, path.as_str())).collect();
+    assert_eq!(known.len(), methods.len(), "two methods for one operation");
+    let rows = operations();
+    let told: BTreeSet<_> = rows.iter().map(|row| (row.method, row.path)).collect();
+    let wanted: BTreeSet<_> = told.iter().filter(|row| !OF_BROWSERS.contains(row)).copied().collect();
+    assert!(OF_BROWSERS.iter().all(|row| told.contains(row)));
+    let without: Vec<_> = wanted.difference(&known).collect();
+    assert!(without.is_empty(), "add methods to api::client for {without:?}");
+    let gone: Vec<_> = known.difference(&wanted).collect();
+    assert!(gone.is_empty(), "api::client asks for what there is not: {gone:?}");
+}
+
 #[test]
 fn every_kind_of_problem_is_told_in_the_documents() {
     let page = std::fs::read_to_string(docs("api.md")).unwrap();

@@ -13,7 +13,7 @@ use tokio_tungstenite::tungstenite::client::IntoClientRequest as _;
 use super::{Answer, Bench, HOST, request};
 use crate::clock::within;
 use crate::engine::EngineMessage;
-use crate::people::Role;
+use crate::people::{Role, SessionRules};
 
 /// A browser: a cookie, and the word that goes with it.
 #[derive(Debug, Clone)]
@@ -48,7 +48,7 @@ impl Browser {
 
 pub(super) const PASSWORD: &str = "a pass over the roof";
 
-fn knock(path: &str, body: &Value) -> Request<Body> {
+pub(super) fn knock(path: &str, body: &Value) -> Request<Body> {
     request(Method::POST, path)
         .header(header::ORIGIN, format!("http://{HOST}"))
         .header(header::CONTENT_TYPE, "application/json")
@@ -213,22 +213,43 @@ async fn a_cookie_is_exchanged_and_a_copy_of_the_old_one_ends_the_session() {
 }
 
 #[tokio::test]
-async fn sessions_end_when_nobody_uses_them_and_after_a_week() {
-    let bench = Bench::new().await;
+async fn sessions_end_after_half_an_hour_without_use_and_after_half_a_day() {
+    let bench = Bench::with_people(|settings| settings.session = SessionRules::default()).await;
+    let minutes = |minutes: f64| bench.hands.pass_h(minutes / 60.0);
     let idle = bench.somebody("verma", Role::Viewer).await;
-    bench.hands.pass_h(11.9);
-    bench.send(idle.read("/api/v1/station")).await.ok();
-    bench.hands.pass_h(11.9);
-    bench.send(idle.read("/api/v1/station")).await.ok();
-    bench.hands.pass_h(12.1);
+    for _ in 0..3 {
+        minutes(26.9);
+        bench.send(idle.read("/api/v1/station")).await.ok();
+    }
+    minutes(30.1);
     assert_eq!(bench.send(idle.read("/api/v1/station")).await.problem(), "login-required");
     let busy = bench.somebody("otto", Role::Viewer).await;
-    for _ in 0..16 {
-        bench.hands.pass_h(10.0);
+    let session = bench.send(busy.read("/api/v1/session")).await.ok();
+    let ends = session["expires_at"].as_str().unwrap().to_owned();
+    for _ in 0..71 {
+        minutes(10.0);
         bench.send(busy.read("/api/v1/station")).await.ok();
     }
-    bench.hands.pass_h(10.0);
+    assert_eq!(bench.send(busy.read("/api/v1/session")).await.ok()["expires_at"], ends.as_str());
+    minutes(10.0);
     assert_eq!(bench.send(busy.read("/api/v1/station")).await.problem(), "login-required");
+}
+
+#[tokio::test]
+async fn a_station_may_have_other_rules_about_sessions_and_the_cookie_follows_them() {
+    let rules = SessionRules { idle_us: 3_600_000_000, max_us: 2 * 3_600_000_000 };
+    let bench = Bench::with_people(|settings| settings.session = rules).await;
+    let code = bench.people.first_welcome().await.unwrap().unwrap();
+    let body = json!({"code": code.split('=').nth(1), "name": "verma", "password": PASSWORD});
+    let welcome = bench.send(knock("/api/v1/welcome", &body)).await;
+    assert!(welcome.header("set-cookie").contains("; Max-Age=7200"), "{}", welcome.header("set-cookie"));
+    let verma = Browser::of(&welcome);
+    bench.hands.pass_h(0.9);
+    bench.send(verma.read("/api/v1/station")).await.ok();
+    bench.hands.pass_h(0.9);
+    bench.send(verma.read("/api/v1/station")).await.ok();
+    bench.hands.pass_h(0.21);
+    assert_eq!(bench.send(verma.read("/api/v1/station")).await.problem(), "login-required");
 }
 
 #[tokio::test]
@@ -297,7 +318,7 @@ async fn a_machine_may_do_what_its_token_and_its_owner_may() {
     assert_eq!(bench.send(ask(Method::POST, "/api/v1/commands", critical)).await.problem(), "forbidden");
     assert_eq!(bench.send(ask(Method::POST, "/api/v1/clock/vouch", json!({}))).await.status().as_u16(), 200);
     assert_eq!(bench.send(ask(Method::GET, "/api/v1/users", json!({}))).await.problem(), "forbidden");
-    // It ends with its owner, comes back with him, and ends for good when it is revoked or its days are over.
+    // It ends with its owner, comes back with him, and ends for good when it is revoked (or its days are over: doors.rs).
     let change = |key: &str, body: Value| root.write(Method::POST, "/api/v1/users/otto", key, &body);
     bench.send(change("d", json!({"disabled": true}))).await.ok();
     assert_eq!(bench.send(ask(Method::GET, "/api/v1/station", json!({}))).await.problem(), "token-refused");

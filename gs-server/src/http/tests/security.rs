@@ -17,6 +17,7 @@ fn concrete(path: &str) -> String {
         .replace("/satellites/{name}", "/satellites/pixelsat-1")
         .replace("{name}", "status")
         .replace("{file}", "main.js")
+        .replace("{month}", "2026-11")
         .replace("{id}", "1")
 }
 
@@ -126,6 +127,9 @@ fn method(route: &Route) -> Method {
     }
 }
 
+/// Origins that are not this server's.
+const STRANGE: [&str; 4] = ["http://evil.example", "null", "http://127.0.0.1:8701", "https://127.0.0.1:8700"];
+
 fn is_changing(route: &Route) -> bool {
     matches!(route.access, Access::Write | Access::Remove)
 }
@@ -135,8 +139,27 @@ fn asked(browser: &Browser, route: &Route) -> Request<Body> {
     browser.write(method(route), &concrete(route.path), "k", &json!({}))
 }
 
-/// The whole matrix: each path × nobody, an expired session, one that was ended, one whose user was shut out, somebody
-/// without the right, a strange origin, no origin, no CSRF word, the word of another session, an exchanged cookie, a wrong
+/// Tokens of machines that had every right: one whose day is over in 24 h, and one that was revoked.
+pub(super) async fn dead_tokens(bench: &Bench, root: &Browser) -> [(&'static str, String); 2] {
+    let scopes: Vec<&str> = Right::ALL.iter().map(|right| right.name()).collect();
+    let make = async |name: &str| {
+        let body = json!({"name": name, "scopes": scopes, "days": 1});
+        let made = bench.send(root.write(Method::POST, "/api/v1/tokens", name, &body)).await.ok();
+        format!("Bearer {}", made["secret"].as_str().unwrap())
+    };
+    let dead = [("expired token", make("short-lived").await), ("revoked token", make("revoked").await)];
+    for (_, bearer) in &dead {
+        let mut look = root.read("/api/v1/version");
+        look.headers_mut().remove("cookie");
+        look.headers_mut().insert("authorization", bearer.parse().unwrap());
+        bench.send(look).await.ok();
+    }
+    bench.send(root.write(Method::DELETE, "/api/v1/tokens/revoked", "r", &json!({}))).await.ok();
+    dead
+}
+
+/// The whole matrix: each path × nobody, an expired session, one that was ended, one whose user was shut out, a machine's
+/// token that is expired, one that was revoked, one of any other scope, a strange origin, no origin, no CSRF word, the word of another session, an exchanged cookie, a wrong
 /// method, a body too large. All are refused, each for its own reason, and nothing is stored.
 #[tokio::test]
 async fn every_path_is_refused_to_everybody_who_may_not() {
@@ -151,8 +174,9 @@ async fn every_path_is_refused_to_everybody_who_may_not() {
         let made = bench.send(root.write(Method::POST, "/api/v1/tokens", right.name(), &body)).await.ok();
         lacking.insert(right, made["secret"].as_str().unwrap().to_owned());
     }
+    let dead = dead_tokens(&bench, &root).await;
     let expired = bench.somebody("eve", Role::Administrator).await;
-    bench.hands.pass_h(13.0);
+    bench.hands.pass_h(25.0);
     let ended = bench.somebody("ed", Role::Administrator).await;
     bench.send(ended.write(Method::DELETE, "/api/v1/session", "o", &json!({}))).await.ok();
     let shut_out = bench.somebody("otto", Role::Administrator).await;
@@ -179,12 +203,23 @@ async fn every_path_is_refused_to_everybody_who_may_not() {
             request.headers_mut().insert("authorization", bearer.parse().unwrap());
             refused.push(("without the right", request, 403, "forbidden"));
         }
+        for (name, bearer) in &dead {
+            let mut request = asked(&nobody, route);
+            request.headers_mut().insert("authorization", bearer.parse().unwrap());
+            refused.push((*name, request, 401, "token-refused"));
+        }
+        if route.policy == Policy::LoggedIn {
+            let mut request = asked(&nobody, route);
+            let bearer = format!("Bearer {}", lacking[&Right::Look]);
+            request.headers_mut().insert("authorization", bearer.parse().unwrap());
+            refused.push(("a machine", request, 401, "login-required"));
+        }
         let strange = |origin: &str| {
             let mut request = asked(&root, route);
             request.headers_mut().insert("origin", origin.parse().unwrap());
             request
         };
-        for origin in ["http://evil.example", "null", "http://127.0.0.1:8701", "https://127.0.0.1:8700"] {
+        for origin in STRANGE {
             refused.push(("strange origin", strange(origin), 403, "origin-refused"));
         }
         if is_changing(route) {
@@ -224,7 +259,7 @@ async fn every_path_is_refused_to_everybody_who_may_not() {
         assert_eq!(bench.send(asked(&new, route)).await.problem(), "login-required", "{path}");
         tried += 2;
     }
-    assert!(tried > 500, "{tried}");
+    assert!(tried > 900, "{tried}");
     assert_eq!(bench.store.counts().await.unwrap().commands, 0);
     assert_eq!(bench.store.last_event_seq().await.unwrap(), before);
 }
@@ -255,7 +290,10 @@ fn what_anybody_may_take_is_known_by_name() {
 #[tokio::test]
 async fn the_doors_take_no_strangers_page_and_no_endless_body() {
     let bench = Bench::new().await;
-    for path in ["/api/v1/session", "/api/v1/welcome"] {
+    let doors: Vec<_> =
+        table().iter().filter(|route| route.access == Access::Door).map(|route| route.path).collect();
+    assert!(!doors.is_empty());
+    for path in doors {
         let knock = || {
             request(Method::POST, path)
                 .header(header::CONTENT_TYPE, "application/json")
@@ -272,6 +310,37 @@ async fn the_doors_take_no_strangers_page_and_no_endless_body() {
         *large.body_mut() = Body::from(format!("{{\"x\":\"{}\"}}", "x".repeat(70_000)));
         assert_eq!(bench.send(large).await.problem(), "body-too-large");
         assert_eq!(bench.send(knock()).await.problem(), "wrong-shape");
+    }
+}
+
+/// What anybody may take is still no strangers' page's, takes its own methods only, and no credential that is none.
+#[tokio::test]
+async fn what_anybody_may_take_refuses_strange_origins_wrong_methods_and_dead_tokens() {
+    let bench = Bench::new().await;
+    let root = bench.somebody("root-admin", Role::Administrator).await;
+    let dead = dead_tokens(&bench, &root).await;
+    bench.hands.pass_h(25.0);
+    let open: Vec<_> = table().into_iter().filter(|route| route.policy == Policy::Anyone).collect();
+    assert!(open.len() > 10);
+    for route in open {
+        let path = concrete(route.path);
+        let asked = || request(method(&route), &path).header(header::CONTENT_TYPE, "application/json");
+        for origin in STRANGE {
+            let answer = bench.send(asked().header("origin", origin).body(Body::from("{}")).unwrap()).await;
+            assert_eq!(answer.problem(), "origin-refused", "{path}: {origin}");
+            assert!(answer.header("set-cookie").is_empty());
+        }
+        for wrong in [Method::PATCH, Method::PUT, Method::OPTIONS, Method::TRACE] {
+            let mut request = asked().body(Body::from("{}")).unwrap();
+            *request.method_mut() = wrong.clone();
+            let answer = bench.send(request).await;
+            assert_eq!(answer.problem(), "method-not-allowed", "{path}: {wrong}");
+            assert!(!answer.header("allow").is_empty(), "{path}: {wrong}");
+        }
+        for (name, bearer) in &dead {
+            let answer = bench.send(asked().header("authorization", bearer).body(Body::from("{}")).unwrap());
+            assert_eq!(answer.await.problem(), "token-refused", "{path}: {name}");
+        }
     }
 }
 

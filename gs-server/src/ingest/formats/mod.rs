@@ -160,20 +160,41 @@ pub type Read = Result<Reception, Refused>;
 
 /// Makes receptions of one item.
 pub fn read(item: &Item, context: &Context, out: &mut Vec<Read>) {
-    let line = item.line;
-    let mut take = |said: Result<Said, Refusal>| {
+    said(item, context, &mut |said| {
         let reception = said.and_then(|said| admit(said, &context.admission));
-        out.push(reception.map_err(|reason| Refused { line, reason }));
-    };
+        out.push(reception.map_err(|reason| Refused { line: item.line, reason }));
+    });
+}
+
+/// What one item claims.
+fn said(item: &Item, context: &Context, take: &mut dyn FnMut(Result<Said, Refusal>)) {
     match &item.body {
         Err(reason) => take(Err(*reason)),
         Ok(body) => match item.format {
-            Format::Json => json::said(item.prefix.as_deref(), body, context, &mut take),
+            Format::Json => json::said(item.prefix.as_deref(), body, context, take),
             Format::SatnogsCsv => take(satnogs::line(body, context)),
             Format::Kiss | Format::Raw => take(Ok(kiss::said(body, item.occurrence, context))),
             Format::Hex => take(hex_log::line(body, item.occurrence, context)),
         },
     }
+}
+
+/// What all items of a reader claim, before anything of it is believed: for those who look at what was measured, whoever's
+/// the bytes are.
+///
+/// # Errors
+/// The reader's own.
+pub fn claims<R: BufRead>(
+    format: Format,
+    reader: R,
+    context: &Context,
+    mut take: impl FnMut(Result<Said, Refused>),
+) -> std::io::Result<()> {
+    for item in Items::new(format, reader) {
+        let item = item?;
+        said(&item, context, &mut |said| take(said.map_err(|reason| Refused { line: item.line, reason })));
+    }
+    Ok(())
 }
 
 /// All receptions of a reader, one after the other. A message that ends the reading is the error of its last element.
