@@ -90,12 +90,14 @@ javascript() {
   done
 }
 
-# End-to-end tests watch system calls, speak HTTP from outside, start PostgreSQL servers of their own, and drive hamlib's dummy rotator and rig.
+# End-to-end tests watch system calls, speak HTTP from outside, start PostgreSQL servers of their own, drive hamlib's dummy rotator and rig,
+# and publish to brokers of their own.
 tools() {
   have strace || install_packages strace
   have curl || install_packages curl ca-certificates
   { have psql && { have initdb || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1; }; } || install_packages postgresql
   { have rotctld && have rigctld; } || install_packages libhamlib-utils
+  { { have mosquitto || [ -x /usr/sbin/mosquitto ]; } && have mosquitto_pub; } || install_packages mosquitto mosquitto-clients
 }
 
 # install_cargo_tool CRATE VERSION [OPTION...]: builds it when it is not in the path. Its artefacts stay out of our target folder.

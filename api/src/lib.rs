@@ -35,6 +35,7 @@ mod antenna;
 pub mod client;
 mod command;
 mod download;
+mod ears;
 mod elements;
 mod event;
 mod forward;
@@ -63,6 +64,7 @@ pub use alert::{AlertNote, AlertView, AssignRequest, ShelveRequest, TargetTested
 pub use antenna::{AntennaView, AxesView, DopplerView, RigView, RotatorPass, RotatorView};
 pub use command::{CommandRequest, CommandView, GateWord, Outcome, OutcomeWord, StageView};
 pub use download::{DownloadRequest, DownloadView};
+pub use ears::{BoardView, ReceiverView, WayState, WayView};
 pub use elements::{
     ElementsAdded, ElementsRequest, ElementsSource, FetchReport, FetchWord, HeldElements, SourceFetched,
     SourceWord,

@@ -10,6 +10,7 @@
 //! | [`storage`], [`witness`] | the archive, the reserve, and the counters' witness beside them |
 //! | [`alerts`] | what is wrong, who knows of it and who is told: e-mail, webhooks, chats |
 //! | [`ingest`] | what strangers' stations heard: formats, and the way into the archive |
+//! | [`ways`] | ways in over the network for what others heard: MQTT, a broker of our own, TinyGS, SatNOGS |
 //! | [`hub`] | committed events on their way to watchers |
 //! | [`http`] | API v1, the stream, the first page |
 //! | [`clock`] | the machine's clock and simulated ones; the only place that reads time or sets a timer |
@@ -60,4 +61,5 @@ mod schedule;
 pub mod sky;
 pub mod storage;
 pub mod twin;
+pub mod ways;
 pub mod witness;

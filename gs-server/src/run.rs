@@ -44,6 +44,7 @@ use crate::people::{People, PeopleSettings, SessionRules};
 use crate::pointing::{Place, Steering};
 use crate::report::ReportTask;
 use crate::storage::{Store, StoreError};
+use crate::ways::{self, WaysParts};
 
 use archive::images_elsewhere;
 pub(crate) use archive::{clock_for, newest_event, not_yet_stored, open_store, postgres, snapshot};
@@ -224,8 +225,21 @@ pub async fn run_with(
     );
     let ears = Ears::new(store.clone(), inbox.clone(), Arc::clone(&timer));
     let aliases = Aliases::of(&config);
+    let parts = WaysParts {
+        config: &config,
+        ears: ears.clone(),
+        aliases: aliases.clone(),
+        store: store.clone(),
+        timer: Arc::clone(&timer),
+        tell: {
+            let alerts = alerts.clone();
+            Arc::new(move |who, found| alerts.report(who, found))
+        },
+    };
+    let ways = ways::open(parts, &api).await?;
     let state = HttpState {
         ears,
+        ways,
         aliases,
         elements,
         alerts,

@@ -5,9 +5,9 @@ use super::{Client, ClientError, Filter, IdempotencyKey};
 use crate::{
     AlertNote, AlertView, ApprovalView, ApproveRequest, AssignRequest, EarView, ForwardTargetView,
     ForwardView, ForwardWhole, HandoverReport, ImportReport, ImportRequest, LinkMade, MonthReport, Nothing,
-    Outcome, OutsideView, Page, PassReport, RefuseRequest, RehearsalRequest, RehearsalView, SessionView,
-    ShelveRequest, TargetTested, TargetView, TokenMade, TokenRequest, TokenView, TransmissionView,
-    UserChange, UserRequest, UserView,
+    Outcome, OutsideView, Page, PassReport, ReceiverView, RefuseRequest, RehearsalRequest, RehearsalView,
+    SessionView, ShelveRequest, TargetTested, TargetView, TokenMade, TokenRequest, TokenView,
+    TransmissionView, UserChange, UserRequest, UserView, WayView,
 };
 
 operations! { READ, read:
@@ -17,6 +17,8 @@ operations! { READ, read:
     alert_targets -> Page<TargetView> = "alerts/targets";
     /// What came in by each ear, and what was refused of it.
     ears -> Page<EarView> = "ears";
+    /// Ways in over the network: how each works.
+    ways -> Page<WayView> = "ears/ways";
     /// To whom receptions are passed on, and whether it arrives.
     forward_targets -> Page<ForwardTargetView> = "forwards/targets";
     /// The document of the whole API.
@@ -38,6 +40,8 @@ operations! { LIST, list:
     rehearsals -> Page<RehearsalView> = "rehearsals";
     /// What others heard: `satellite`, `source`, `kind`, `original`.
     receptions -> Page<OutsideView> = "receptions";
+    /// Who hears the satellite, and how one's own boards are: `satellite`.
+    receivers -> Page<ReceiverView> = "receivers";
     /// What is passed on to others, and how it stands: `target`, `state`.
     forwards -> Page<ForwardView> = "forwards";
     /// What the next shift must know: `since`.

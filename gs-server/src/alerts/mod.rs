@@ -31,5 +31,6 @@ mod tests;
 pub(crate) use gather::Watched;
 pub use handle::{Acted, Action, ActionFailure, AlertsHandle, TargetNow, TestFailure};
 pub(crate) use message::shape;
+pub(crate) use target::secret_of_file;
 pub(crate) use task::{AlertsParts, AlertsTask};
 pub(crate) use view::view;

@@ -13,6 +13,7 @@ mod decode;
 mod demo;
 mod doctor;
 mod downlink;
+mod ears;
 mod elements;
 mod failure;
 mod fit;
@@ -160,6 +161,8 @@ pub enum Command {
     Approve(approve::Approve),
     /// Say no to it, or take back what one asked for oneself
     Refuse(approve::Refuse),
+    /// Who hears the satellite, and how the ways in for what others heard work
+    Ears(ears::ListEars),
     /// Bring in what others heard: files of TinyGS, SatNOGS, KISS, hex
     Import(import::Import),
     /// Derive every value again from the raw frames
@@ -220,6 +223,7 @@ impl Cli {
             Command::Approve(approve) => approve.run(),
             Command::Refuse(refuse) => refuse.run(),
             Command::Report(report) => report.run(),
+            Command::Ears(ears) => ears.run(),
             Command::Import(import) => import.run(),
             Command::Redecode(redecode) => redecode.run(),
         }

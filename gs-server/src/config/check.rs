@@ -86,6 +86,7 @@ impl Config {
         self.check_rssi()?;
         self.check_storage()?;
         self.check_elements()?;
+        self.check_ears()?;
         self.check_ops()?;
         self.check_people()?;
         self.alerts.check()?;

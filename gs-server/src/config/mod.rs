@@ -26,6 +26,7 @@
 mod alerts;
 mod antenna;
 mod check;
+mod ears;
 mod elements;
 mod environment;
 mod error;
@@ -48,6 +49,7 @@ pub use alerts::{
     AlertsSection, EscalationSection, RuleSection, TargetKind, TargetSection, TransportSecurity,
 };
 pub use antenna::{RigSection, RotatorSection};
+pub use ears::{BoardLogin, EarKind, EarSection, TlsFilesSection};
 pub(crate) use elements::is_loopback;
 pub use elements::{ElementsSection, FetchSource, MIN_AGE_LEAST_H};
 pub use environment::Environment;
@@ -82,6 +84,9 @@ pub struct Config {
     /// Where elements are fetched from; nowhere by default.
     #[serde(default)]
     pub elements: ElementsSection,
+    /// Ways in over the network for what others heard; none by default.
+    #[serde(default)]
+    pub ears: Vec<EarSection>,
     /// What is an alert, and who is told.
     #[serde(default)]
     pub alerts: AlertsSection,
@@ -170,7 +175,8 @@ impl Config {
         let tls = self.http.tls.iter_mut().flat_map(|tls| [&mut tls.certificate, &mut tls.key]);
         let secrets = self.alerts.targets.iter_mut().filter_map(|target| target.secret_file.as_mut());
         let forwards = self.forward.iter_mut().filter_map(|target| target.secret_file.as_mut());
-        let others = others.chain(secrets).chain(forwards);
+        let ears = self.ears.iter_mut().flat_map(EarSection::paths);
+        let others = others.chain(secrets).chain(forwards).chain(ears);
         for path in keys.chain(files).chain(others).chain(logins).chain(backup).chain(tls).chain(password) {
             if path.is_relative() {
                 *path = base.join(&*path);

@@ -30,6 +30,7 @@ impl Changes {
         note(old.rig != new.rig, "rig");
         note(old.http != new.http, "http");
         note(old.elements != new.elements, "elements");
+        note(old.ears != new.ears, "ears");
         note(old.backup != new.backup, "backup");
         note(old.disk != new.disk, "disk");
         note(old.retention != new.retention, "retention");

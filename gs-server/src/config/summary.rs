@@ -91,6 +91,9 @@ impl fmt::Display for Config {
                 self.elements.min_age_h,
             )?;
         }
+        for ear in &self.ears {
+            writeln!(f, "ear {} ({}): {}", ear.name, ear.kind.name(), ear.shown())?;
+        }
         write!(
             f,
             "http {}: hosts {:?}, token in {}{}; two persons: {:?}",

@@ -28,7 +28,7 @@ pub mod sets;
 pub mod task;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub(crate) use client::{chain, http_client};
 pub use door::{AddError, Door, held};

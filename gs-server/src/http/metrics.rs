@@ -24,6 +24,7 @@ pub(super) async fn get(State(app): State<App>) -> Response {
     archive(&mut page, &app, &status, metrics).await;
     engine(&mut page, metrics);
     antenna(&mut page, &app);
+    ways(&mut page, &app);
     upkeep(&mut page, metrics);
     machine(&mut page, app.state.store.folder().to_path_buf()).await;
     ([(header::CONTENT_TYPE, CONTENT_TYPE)], page.finish()).into_response()
@@ -211,6 +212,30 @@ fn antenna(page: &mut Exposition, app: &App) {
     if let Some(rig) = &found.rig {
         page.gauge("gs_rig_connected", "rigctld answers.").is(&[], flag(rig.is_connected));
     }
+}
+
+/// Ways in over the network, and the boards that speak by them.
+fn ways(page: &mut Exposition, app: &App) {
+    let views = app.state.ways.views();
+    if views.is_empty() {
+        return;
+    }
+    page.gauge("gs_ear_working", "The way in works.");
+    for way in &views {
+        page.is(&[("ear", &way.name), ("kind", &way.kind)], flag(way.state == api::WayState::Working));
+    }
+    page.gauge("gs_ear_age_seconds", "Since it answered, or a message came, last.");
+    for way in &views {
+        page.may_be(&[("ear", &way.name), ("kind", &way.kind)], way.age_s);
+    }
+    page.counter("gs_ear_counts_total", "Requests, messages, receptions, and refusals by reason.");
+    for way in &views {
+        for (what, count) in &way.counts {
+            page.is(&[("ear", &way.name), ("what", what)], *count as f64);
+        }
+    }
+    let online = app.state.ways.boards().iter().filter(|(.., board)| board.online).count();
+    page.gauge("gs_boards_online", "Boards of one's own that are there.").is(&[], online as f64);
 }
 
 fn upkeep(page: &mut Exposition, metrics: &Metrics) {

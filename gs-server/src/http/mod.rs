@@ -34,6 +34,7 @@ mod page;
 mod people;
 mod plans;
 mod problem;
+mod receivers;
 mod receptions;
 mod rehearsals;
 mod release;
@@ -78,6 +79,7 @@ use crate::hub::Hub;
 use crate::ingest::{Aliases, Ears};
 use crate::people::People;
 use crate::storage::Store;
+use crate::ways::WaysHandle;
 
 pub use antenna::RadioOnAir;
 pub use hosts::AllowedHosts;
@@ -100,6 +102,8 @@ pub struct HttpState {
     pub alerts: AlertsHandle,
     /// The way of reports into the archive.
     pub ears: Ears,
+    /// Ways in over the network, and the boards that speak by them.
+    pub ways: WaysHandle,
     /// What our satellites are called elsewhere.
     pub aliases: Aliases,
     /// What is passed on to others.

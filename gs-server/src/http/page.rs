@@ -16,7 +16,7 @@ macro_rules! files {
 
 files! {
     "agenda.js" "alerts.js" "api.js" "approvals.js" "begin.js" "coming.js" "commands.js" "console.css" "days.js"
-    "docs.css" "docs.js" "dom.js" "door.css" "door.js" "events.js" "favicon.svg" "format.js" "hands.js" "heartbeat.js"
+    "docs.css" "docs.js" "dom.js" "door.css" "door.js" "ears.js" "events.js" "favicon.svg" "format.js" "hands.js" "heartbeat.js"
     "held.js" "links.js" "login.js" "main.js" "model.js" "notice.js" "passes.js" "picture.js" "plan.css" "plan.js"
     "report.css" "runs.js" "session.js" "stream.js" "tokens.css" "top.js" "welcome.js"
 }

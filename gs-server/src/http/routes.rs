@@ -12,8 +12,8 @@ use super::admit::{Policy, admit};
 use super::write::{guard_door, guard_write};
 use super::{
     App, alerts, antenna, approvals, clock, commands, downloads, elements, events, forwards, frames, images,
-    keys, links, metrics, openapi, page, people, plans, receptions, rehearsals, reports, runs, schedule,
-    session, sky, station, status, stream, telemetry,
+    keys, links, metrics, openapi, page, people, plans, receivers, receptions, rehearsals, reports, runs,
+    schedule, session, sky, station, status, stream, telemetry,
 };
 use crate::people::Right::{Approve, Command, Look, ManagePeople, ManageStation, Plan};
 
@@ -114,6 +114,8 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/receptions", Needs(Look), receptions::list),
         write("/api/v1/receptions", Needs(Plan), receptions::import),
         read("/api/v1/ears", Needs(Look), receptions::ears),
+        read("/api/v1/ears/ways", Needs(Look), receivers::ways),
+        read("/api/v1/receivers", Needs(Look), receivers::list),
         read("/api/v1/telemetry", Needs(Look), telemetry::series),
         read("/api/v1/telemetry/latest", Needs(Look), telemetry::latest),
         read("/api/v1/parameters", Needs(Look), telemetry::parameters),

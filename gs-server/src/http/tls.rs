@@ -183,6 +183,11 @@ impl Tls {
         config.alpn_protocols = vec![b"http/1.1".to_vec()];
         Ok(Self(TlsAcceptor::from(Arc::new(config))))
     }
+
+    /// For what does not speak HTTP.
+    pub(crate) fn acceptor(self) -> TlsAcceptor {
+        self.0
+    }
 }
 
 /// Hands out connections whose handshake is done.

@@ -54,6 +54,14 @@ pub enum RunError {
     /// The archive.
     #[error("the archive cannot be opened")]
     Store(#[from] StoreError),
+    /// A way in for what others heard.
+    #[error("ear {name}: {words}")]
+    Ear {
+        /// Its name.
+        name: String,
+        /// What is wrong with it, and the remedy.
+        words: String,
+    },
     /// The reserve.
     #[error("the reserve cannot be read")]
     Reserve(#[from] ReserveError),

@@ -364,7 +364,7 @@ impl Store {
         }
         let mut statement = Builder::new("select id, bytes, heard_at_us, case when station = ");
         statement.push_bind(ELSEWHERE).push(" and link = ").push_bind(UNDATED);
-        statement.push(" then 0 else 1 end as dated from frames where substr(bytes, 9, 4) in (");
+        statement.push(" then cast(0 as bigint) else cast(1 as bigint) end as dated from frames where substr(bytes, 9, 4) in (");
         for (at, checksum) in checksums.iter().enumerate() {
             statement.push(if at == 0 { "" } else { ", " }).push_bind(*checksum);
         }

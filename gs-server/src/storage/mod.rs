@@ -33,6 +33,7 @@ mod people;
 mod pg;
 mod progress;
 mod read;
+mod receivers;
 mod redecode;
 pub mod reserve;
 mod retention;
@@ -75,6 +76,7 @@ pub use read::{
     EventCount, EventQuery, FrameCount, FrameQuery, Heard, HeardCounts, ImageBytes, ImageMap, LatestValue,
     Page, Sample, Samples, Scope, Series, Span, TelemetryQuery,
 };
+pub use receivers::{Receiver, ReceiversQuery};
 pub use redecode::{RedecodeProgress, RedecodeReport};
 pub use rows::{
     AuditLinkRow, AuditRow, ChunkRow, CommandRow, ConditionRow, CounterFloorRow, DownloadRow, ElementsRow,

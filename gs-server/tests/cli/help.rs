@@ -118,6 +118,7 @@ fn every_verb_tells_what_it_does() {
             "gs-server-approvals",
             "gs-server-approve",
             "gs-server-refuse",
+            "gs-server-ears",
             "gs-server-import",
             "gs-server-redecode",
         ]

@@ -33,6 +33,8 @@ pub enum AlertKind {
     Sealing,
     /// The backup failed. Subject: whoever makes it.
     Backup,
+    /// A way in for what others heard refuses us. Subject: the ear.
+    Ear,
     /// An event of a kind and level that a rule names. Subject: the kind, and whom it concerns.
     Event,
     /// Messages to a target do not arrive. Subject: the target.
@@ -41,7 +43,7 @@ pub enum AlertKind {
 
 impl AlertKind {
     /// All kinds.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Limit,
         Self::Beacon,
         Self::Silent,
@@ -54,6 +56,7 @@ impl AlertKind {
         Self::Rotator,
         Self::Sealing,
         Self::Backup,
+        Self::Ear,
         Self::Event,
         Self::Delivery,
     ];
@@ -73,6 +76,7 @@ impl AlertKind {
             Self::Rotator => "rotator",
             Self::Sealing => "sealing",
             Self::Backup => "backup",
+            Self::Ear => "ear",
             Self::Event => "event",
             Self::Delivery => "delivery",
         }

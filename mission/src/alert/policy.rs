@@ -112,7 +112,9 @@ impl Rule {
             AlertKind::Link => (30, 60),
             AlertKind::Rotator => (15, 60),
             AlertKind::Sealing => (60, 0),
-            AlertKind::Plan | AlertKind::Event | AlertKind::Backup | AlertKind::Delivery => (0, 0),
+            AlertKind::Plan | AlertKind::Event | AlertKind::Backup | AlertKind::Ear | AlertKind::Delivery => {
+                (0, 0)
+            }
         };
         let (events, min_level) = match kind {
             AlertKind::Event => (vec![EventKind::SatelliteError, EventKind::ChunkConflict], Level::Warning),

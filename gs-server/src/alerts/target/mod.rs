@@ -17,6 +17,7 @@ use serde_json::Value;
 
 use crate::config::{ConfigError, TargetKind, TargetSection};
 use secret::SecretSource;
+pub(crate) use secret::secret_of_file;
 
 /// No attempt takes longer.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -55,6 +55,11 @@ impl SecretSource {
     }
 }
 
+/// The one line of a private file; the error is words with the remedy, never the content.
+pub(crate) fn secret_of_file(path: &Path) -> Result<Zeroizing<String>, String> {
+    from_file(path).map_err(|error| error.to_string())
+}
+
 fn from_file(path: &Path) -> Result<Zeroizing<String>, SecretError> {
     let failed = |source| SecretError::Read { path: path.to_owned(), source };
     // A pipe in its place cannot hold us up.

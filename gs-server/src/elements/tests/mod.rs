@@ -1,7 +1,7 @@
 //! Real requests to a real server that counts them, on a clock that stands still.
 
 mod bench;
-mod source;
+pub(crate) mod source;
 
 use std::time::Duration;
 

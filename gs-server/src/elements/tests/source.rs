@@ -13,18 +13,18 @@ use tokio_util::sync::CancellationToken;
 
 /// One request as it came.
 #[derive(Debug, Clone)]
-pub(super) struct Asked {
-    pub(super) line: String,
-    pub(super) headers: HeaderMap,
-    pub(super) body: String,
+pub(crate) struct Asked {
+    pub(crate) line: String,
+    pub(crate) headers: HeaderMap,
+    pub(crate) body: String,
 }
 
 /// What is answered; `None`: nothing, ever.
-pub(super) type Script = dyn Fn(&Asked) -> Option<Response> + Send + Sync;
+pub(crate) type Script = dyn Fn(&Asked) -> Option<Response> + Send + Sync;
 
 #[derive(Clone)]
-pub(super) struct Source {
-    pub(super) address: SocketAddr,
+pub(crate) struct Source {
+    pub(crate) address: SocketAddr,
     asked: Arc<Mutex<Vec<Asked>>>,
     script: Arc<Mutex<Arc<Script>>>,
     stop: CancellationToken,
@@ -40,7 +40,7 @@ impl Drop for Source {
 }
 
 impl Source {
-    pub(super) async fn new(script: impl Fn(&Asked) -> Option<Response> + Send + Sync + 'static) -> Self {
+    pub(crate) async fn new(script: impl Fn(&Asked) -> Option<Response> + Send + Sync + 'static) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let source = Self {
             address: listener.local_addr().unwrap(),
@@ -59,24 +59,24 @@ impl Source {
         source
     }
 
-    pub(super) async fn saying(status: u16, body: &str) -> Self {
+    pub(crate) async fn saying(status: u16, body: &str) -> Self {
         let body = body.to_owned();
         Self::new(move |_| Some(say(status, &body))).await
     }
 
-    pub(super) fn now_says(&self, script: impl Fn(&Asked) -> Option<Response> + Send + Sync + 'static) {
+    pub(crate) fn now_says(&self, script: impl Fn(&Asked) -> Option<Response> + Send + Sync + 'static) {
         *self.script.lock().unwrap() = Arc::new(script);
     }
 
-    pub(super) fn asked(&self) -> Vec<Asked> {
+    pub(crate) fn asked(&self) -> Vec<Asked> {
         self.asked.lock().unwrap().clone()
     }
 
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.asked.lock().unwrap().len()
     }
 
-    pub(super) fn url(&self) -> String {
+    pub(crate) fn url(&self) -> String {
         format!("http://{}/gp.php?GROUP=cubesat&FORMAT=json", self.address)
     }
 }
@@ -97,11 +97,11 @@ async fn answer(State(source): State<Source>, request: Request) -> Response {
     }
 }
 
-pub(super) fn say(status: u16, body: &str) -> Response {
+pub(crate) fn say(status: u16, body: &str) -> Response {
     say_with(status, &[], body)
 }
 
-pub(super) fn say_with(status: u16, headers: &[(&str, &str)], body: &str) -> Response {
+pub(crate) fn say_with(status: u16, headers: &[(&str, &str)], body: &str) -> Response {
     let mut response = Response::builder().status(StatusCode::from_u16(status).unwrap());
     for (name, value) in headers {
         response = response.header(*name, *value);

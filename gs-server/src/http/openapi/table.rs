@@ -7,8 +7,8 @@ use api::{
     DownloadRequest, DownloadView, EarView, ElementsAdded, ElementsRequest, ElementsSource, EventView,
     FetchReport, FrameView, HandoverReport, Health, HeldElements, ImageView, ImportReport, ImportRequest,
     LatestValue, LimitView, LookList, MonthReport, Nothing, Outcome, OutsideView, ParameterView, PassKept,
-    PassList, PassReport, PlanText, PlanView, RunReport, RunView, ScheduleView, StationView, StreamMessage,
-    StreamRequest, TelemetryPage, Version,
+    PassList, PassReport, PlanText, PlanView, ReceiverView, RunReport, RunView, ScheduleView, StationView,
+    StreamMessage, StreamRequest, TelemetryPage, Version, WayView,
 };
 
 use super::operation::{Doc, Kind, Param, delete, get, param, post, required};
@@ -137,6 +137,15 @@ fn archive() -> Vec<Doc> {
             .problems(&[K::BadArgument, K::UnknownSatellite]),
         get("/api/v1/ears", "archive", "ears", "What came in by each ear, and what was refused of it")
             .page::<EarView>(),
+        get("/api/v1/ears/ways", "archive", "ways", "Ways in over the network: how each works")
+            .page::<WayView>(),
+        get("/api/v1/receivers", "archive", "receivers", "Who hears the satellite, and how one's own boards are")
+            .query(&[
+                SATELLITE,
+                param("start", Kind::Time, "Begin of the range; 30 days ago when both are left out."),
+                param("stop", Kind::Time, "End of the range, not included."),
+            ])
+            .page::<ReceiverView>(),
         get("/api/v1/telemetry", "archive", "telemetry", "One parameter over time, thinned where there is much")
             .query(&[
                 required("parameter", Kind::Text, "Which, e.g. `heartbeat.temp`."),

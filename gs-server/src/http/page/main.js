@@ -3,6 +3,7 @@ import { paintAlerts, refreshAlerts } from "./alerts.js";
 import { paintApprovals, refreshApprovals, wireApprovals } from "./approvals.js";
 import { beginPage } from "./begin.js";
 import { paintCommands, refreshCommands, wireHands } from "./commands.js";
+import { refreshEars } from "./ears.js";
 import { addEvent, resetEvents } from "./events.js";
 import { paintHeartbeat, refreshHeartbeat } from "./heartbeat.js";
 import { paintLinks } from "./links.js";
@@ -43,7 +44,10 @@ function onStatus(station) {
 
 function onEvent(event) {
   addEvent(event);
-  if (event.kind === "frame-heard") refreshHeartbeat();
+  if (event.kind === "frame-heard") {
+    refreshHeartbeat();
+    refreshEars();
+  }
   if (event.kind === "command-stage") refreshCommands();
   if (event.kind === "alert") refreshAlerts();
   if (event.image !== null) refreshPicture();
@@ -55,6 +59,7 @@ function refreshAll() {
   refreshPicture();
   refreshAlerts();
   refreshApprovals();
+  refreshEars();
 }
 
 beginPage({

@@ -9,9 +9,10 @@ use super::super::openapi::document;
 use super::{Answer, Bench, TOKEN, heartbeat, image_info, request};
 
 /// The lists, and the field that says when.
-const LISTS: [(&str, &str); 19] = [
+const LISTS: [(&str, &str); 20] = [
     ("frames", "heard_at"),
     ("receptions", "received_at"),
+    ("receivers", "last_heard_at"),
     ("commands", "created_at"),
     ("downloads", "created_at"),
     ("images", "declared_at"),
@@ -31,8 +32,15 @@ const LISTS: [(&str, &str); 19] = [
     ("tokens", "created_at"),
 ];
 /// What is no record of a moment: it is how things stand.
-const TIMELESS: [&str; 6] =
-    ["ears", "parameters", "telemetry/latest", "elements/sources", "alerts/targets", "forwards/targets"];
+const TIMELESS: [&str; 7] = [
+    "ears",
+    "ears/ways",
+    "parameters",
+    "telemetry/latest",
+    "elements/sources",
+    "alerts/targets",
+    "forwards/targets",
+];
 
 #[test]
 fn every_list_of_the_document_takes_start_and_stop() {

@@ -189,6 +189,7 @@ impl Bench {
         .unwrap();
         let state = HttpState {
             ears: crate::ingest::Ears::new(store.clone(), inbox.clone(), Arc::clone(&timer)),
+            ways: crate::ways::WaysHandle::none(Arc::clone(&timer)),
             aliases: crate::ingest::Aliases::default(),
             alerts: alerts.clone(),
             forwards: crate::forward::spawn(
