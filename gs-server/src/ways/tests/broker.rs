@@ -182,3 +182,96 @@ async fn silent_noisy_and_too_many_clients_are_bounded() {
     bench.until_heard((1, 0, 1)).await;
     bench.stop().await;
 }
+
+/// Whoever has a board's password, and nothing good in mind: everything is counted, little is held, and the radio is heard.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_flood_of_lies_is_counted_and_the_radio_goes_on() {
+    use std::io::Write as _;
+    let port = free_port();
+    let home = home(port, LOGINS);
+    let bench = home.serve(START).await;
+    let messages = std::env::var("FLOOD").ok().and_then(|count| count.parse().ok()).unwrap_or(2_000_u32);
+    let before_kib = resident_kib();
+    let mut flood = Command::new("mosquitto_pub")
+        .args(["-h", "127.0.0.1", "-p", &port.to_string(), "-t", "tinygs/team/roof/tele/rx", "-l"])
+        .args(TEAM)
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = flood.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || {
+        for number in 0..messages {
+            let line = match number % 8 {
+                0 => "{\"data\":7}".to_owned(),
+                1 => format!("{{\"data\":{}", "[".repeat(5_000)),
+                2 => rx(b"TinyGS-test", START.0),
+                3 => rx(b"foreign", START.0),
+                4 => "x".repeat(18_000),
+                _ => rx(&heartbeat(number), START.0 - i64::from(number) * 1_000),
+            };
+            writeln!(input, "{line}").unwrap();
+        }
+    });
+    let mut radio = 0;
+    let mut most_kib = before_kib;
+    let total = |way: &serde_json::Value| {
+        let counts = way["counts"].as_object().unwrap();
+        let passed_over = counts.get("too-long").map_or(0, |count| count.as_u64().unwrap());
+        let read: u64 = [
+            "receptions",
+            "not-a-report",
+            "malformed",
+            "too-deep",
+            "test-packet",
+            "foreign",
+            "no-bytes",
+            "no-room",
+            "bad-bytes",
+        ]
+        .iter()
+        .filter_map(|what| counts.get(*what)?.as_u64())
+        .sum();
+        passed_over + read
+    };
+    let mut done = 0;
+    while done < u64::from(messages) {
+        let link = mission::LinkId::new("radio").unwrap();
+        let received = mission::Clock::now(&bench.clock);
+        let bytes = heartbeat(4_000_000_000 + radio);
+        let heard =
+            crate::engine::EngineMessage::Bytes { link, bytes, source: mission::Source::Radio, received };
+        bench.ready.inbox.send(heard).await;
+        radio += 1;
+        done = total(&bench.get("ears/ways").await["items"][0]);
+        most_kib = most_kib.max(resident_kib());
+        wall_sleep(Duration::from_millis(50)).await;
+    }
+    writer.join().unwrap();
+    assert!(flood.wait().unwrap().success());
+    let way = bench.get("ears/ways").await["items"][0].clone();
+    assert_eq!(total(&way), u64::from(messages), "each by its reason: {way}");
+    let mut of_radio = 0;
+    for _ in 0..500 {
+        let link = crate::storage::Scope { link: Some("radio".into()), ..Default::default() };
+        let page = crate::storage::Page { limit: 1_000, ..Default::default() };
+        let query = crate::storage::FrameQuery { scope: link, page, ..Default::default() };
+        of_radio = bench.ready.store.frames(&query).await.unwrap().len();
+        if of_radio == (radio as usize).min(1_000) {
+            break;
+        }
+        wall_sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(of_radio, (radio as usize).min(1_000), "nothing that the radio heard is lost");
+    println!(
+        "{messages} messages, {radio} frames by radio meanwhile, memory grew by {} KiB: {way}",
+        most_kib - before_kib
+    );
+    assert!(most_kib - before_kib < 64 << 10, "{} KiB", most_kib - before_kib);
+    bench.stop().await;
+}
+
+fn resident_kib() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmRSS")).unwrap_or_default();
+    line.split_whitespace().nth(1).and_then(|kib| kib.parse().ok()).unwrap_or(0)
+}

@@ -6,3 +6,4 @@ mod doors;
 mod mosquitto;
 mod orders;
 mod pollers;
+mod tls;

@@ -11,7 +11,7 @@ use crate::elements::Offline;
 use crate::engine::EngineMessage;
 use crate::ingest::formats::{self, Context, Format, Topic};
 use crate::ingest::{Aliases, Ears, Outcome};
-use crate::storage::FrameQuery;
+use crate::storage::{FrameQuery, ReceiversQuery};
 
 struct Station {
     config: Config,
@@ -164,6 +164,13 @@ async fn all_orders(database: Option<&str>) {
         }
         assert_eq!(station.heard().await, ((number + 1).min(100), 1, 4), "{order:?}");
     }
+    let receivers = station.open().door.store.receivers(&ReceiversQuery::default()).await.unwrap();
+    let told: Vec<_> = receivers.iter().map(|who| (who.id.as_str(), who.frames, who.median_snr_db)).collect();
+    assert!(
+        told.contains(&("team/roof", 120, Some(-11.75))) && told.contains(&("DL0XYZ-JO62qn", 120, None)),
+        "{told:?}"
+    );
+    assert_eq!(receivers.iter().find(|who| who.id == "team/roof").unwrap().place, Some((12.971, 77.594)));
     station.open.take().unwrap().close().await.unwrap();
 }
 

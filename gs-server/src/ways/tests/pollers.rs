@@ -236,3 +236,51 @@ async fn satnogs_is_read_page_by_page_on_its_own_host_only() {
     assert_eq!(elsewhere.count(), 0);
     bench.stop().await;
 }
+
+/// Polls often while the satellite is over our station and for 20 minutes after, seldom otherwise: held against the passes
+/// that the search for passes finds.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn looks_follow_the_passes() {
+    let clock: Arc<Mutex<Option<crate::clock::SteppedClock>>> = Arc::default();
+    let looks: Arc<Mutex<Vec<i64>>> = Arc::default();
+    let (shared, noted) = (Arc::clone(&clock), Arc::clone(&looks));
+    let source = Source::new(move |_| {
+        use mission::Clock as _;
+        let at = shared.lock().unwrap().as_ref().map_or(START, |clock| clock.now().utc);
+        noted.lock().unwrap().push(at.0);
+        Some(say(200, &list(&[])))
+    })
+    .await;
+    let home = home(&ear(&source, "every_min = 60\nnear_pass_every_min = 5\n")).await;
+    let mut bench = home.serve(START).await;
+    *clock.lock().unwrap() = Some(bench.clock.clone());
+    let omm = r#"[{"OBJECT_NAME":"PIXELSAT-1","OBJECT_ID":"2026-098A","EPOCH":"2026-09-21T12:00:00.000000","MEAN_MOTION":15.19,
+        "ECCENTRICITY":0.0004,"INCLINATION":97.5,"RA_OF_ASC_NODE":21.3,"ARG_OF_PERICENTER":89.2,"MEAN_ANOMALY":80.4,"EPHEMERIS_TYPE":0,
+        "CLASSIFICATION_TYPE":"U","NORAD_CAT_ID":98765,"ELEMENT_SET_NO":999,"REV_AT_EPOCH":2,"BSTAR":0.00003,"MEAN_MOTION_DOT":0,"MEAN_MOTION_DDOT":0}]"#;
+    let added = bench.post("elements", &json!({"text": omm})).await;
+    assert_eq!(added["added"], 1, "{added}");
+    let passes = bench.get("passes?stop=2026-09-22T14:13:20Z").await;
+    for _ in 0..24 {
+        bench.pass(60 * MINUTE_US).await;
+    }
+    bench.stop().await;
+    let time = |value: &Value| value.as_str().unwrap().parse::<jiff::Timestamp>().unwrap().as_microsecond();
+    let windows: Vec<(i64, i64)> = passes["passes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|pass| (time(&pass["aos"]), time(&pass["los"]) + 20 * MINUTE_US as i64))
+        .collect();
+    assert!(windows.len() >= 4, "{passes}");
+    let looks = looks.lock().unwrap().clone();
+    for (from, until) in &windows {
+        let inside = looks.iter().filter(|at| (*from..*until).contains(at)).count();
+        assert!(inside as i64 >= (until - from) / (8 * MINUTE_US as i64), "{inside} looks in a window");
+    }
+    let slack = 7 * MINUTE_US as i64;
+    let far = |at: i64| windows.iter().all(|(from, until)| at < from - slack || at > until + slack);
+    for pair in looks.windows(2).filter(|pair| far(pair[0]) && far(pair[1]) && pair[0] > START.0) {
+        assert!(pair[1] - pair[0] >= 55 * MINUTE_US as i64, "{} min", (pair[1] - pair[0]) / MINUTE_US as i64);
+    }
+    assert!(looks.len() > 40 && looks.len() < 140, "{}", looks.len());
+}
