@@ -64,7 +64,11 @@ impl MailCatcher {
             let verb = line.split([' ', ':']).next().unwrap_or_default().to_ascii_uppercase();
             let answer = match verb.as_str() {
                 "EHLO" => "250-catcher\r\n250-AUTH PLAIN\r\n250 8BITMIME",
-                "AUTH" if self.refuses.load(Ordering::Relaxed) => "535 who are you?",
+                "AUTH" if self.refuses.load(Ordering::Relaxed) => {
+                    // As bad servers do, with the login in their words.
+                    stream.write_all(format!("535 {line}: who are you?\r\n").as_bytes()).ok()?;
+                    continue;
+                }
                 "AUTH" => "235 come in",
                 "DATA" => {
                     stream.write_all(b"354 go on\r\n").ok()?;

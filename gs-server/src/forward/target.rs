@@ -6,6 +6,7 @@ use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER};
 use reqwest::{Method, Response, StatusCode, Url};
 
 use super::form::{Form, Sender};
+use crate::alerts::target::hide;
 use crate::alerts::target::secret::SecretSource;
 use crate::alerts::target::webhook::sign;
 use crate::config::{ForwardKind, ForwardSection};
@@ -30,6 +31,18 @@ pub(super) enum Fate {
     NotNow(String, Option<u64>),
     /// Nobody knows whether it arrived.
     Unsure(String),
+}
+
+impl Fate {
+    /// The same without a piece of the secret: far ends repeat what they were asked.
+    fn without(self, secret: &str) -> Self {
+        match self {
+            Self::Taken => Self::Taken,
+            Self::Unwanted(why) => Self::Unwanted(hide::without(&why, secret)),
+            Self::NotNow(why, pause_s) => Self::NotNow(hide::without(&why, secret), pause_s),
+            Self::Unsure(why) => Self::Unsure(hide::without(&why, secret)),
+        }
+    }
 }
 
 /// A target, ready to be sent to. Secrets are read at each attempt and not kept.
@@ -96,11 +109,15 @@ impl Target {
                     .header("webhook-signature", signature);
             }
         }
-        match request.body(form.body.clone()).send().await {
+        let fate = match request.body(form.body.clone()).send().await {
             Ok(response) => fate(response).await,
             // Nothing has left yet.
             Err(error) if error.is_connect() || error.is_builder() => Fate::NotNow(chain(&error), None),
             Err(error) => Fate::Unsure(chain(&error)),
+        };
+        match &secret {
+            Some(secret) => fate.without(secret),
+            None => fate,
         }
     }
 }

@@ -3,27 +3,16 @@
 use api::{ForwardRequest, ForwardTargetView, ForwardView, ForwardWhole, Nothing, Page, ProblemKind, Time};
 use axum::Json;
 use axum::extract::State;
-use serde::Deserialize;
 
 use super::App;
-use super::extract::{Id, Name, Query, during, page, paged, whole};
+use super::extract::{Id, Name, Query, list_query, paged, whole};
 use super::problem::Failure;
 use super::write::Write;
 use crate::config::ForwardKind;
 use crate::forward::ForwardTargetNow;
 use crate::storage::{ForwardQuery, ForwardRow, ForwardState};
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Asked {
-    target: Option<String>,
-    state: Option<String>,
-    start: Option<Time>,
-    stop: Option<Time>,
-    after: Option<i64>,
-    before: Option<i64>,
-    limit: Option<u32>,
-}
+list_query! { Asked { target: String, state: String } }
 
 pub(super) async fn list(
     State(app): State<App>,
@@ -38,12 +27,8 @@ pub(super) async fn list(
             Failure::field(ProblemKind::BadParameter, "state", message)
         })?),
     };
-    let query = ForwardQuery {
-        target: asked.target,
-        state,
-        during: during(asked.start, asked.stop)?,
-        page: page(asked.after, asked.before, asked.limit)?,
-    };
+    let (during, page) = (asked.during()?, asked.page()?);
+    let query = ForwardQuery { target: asked.target, state, during, page };
     let rows = app.state.store.forwards(&query).await?;
     Ok(Json(paged(rows.iter().map(view).collect(), &query.page, |one: &ForwardView| one.id)))
 }

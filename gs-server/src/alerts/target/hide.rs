@@ -13,14 +13,20 @@ const INSTEAD: &str = "[secret]";
 /// The same error without a piece of the secret, nor of the login that it is part of.
 pub(super) fn hide(error: SendError, secret: &str, user: Option<&str>) -> SendError {
     let login = |user: &str| STANDARD.encode(format!("\0{user}\0{secret}"));
-    let forms: Vec<String> =
-        [secret.to_owned(), STANDARD.encode(secret)].into_iter().chain(user.map(login)).collect();
-    let without = |text: String| forms.iter().fold(text, |text, form| mask(&text, form));
+    let without = |text: String| {
+        let text = without(&text, secret);
+        user.map(login).map_or(text.clone(), |login| mask(&text, &login))
+    };
     match error {
         SendError::Unreached(text) => SendError::Unreached(without(text)),
         SendError::Refused(text) => SendError::Refused(without(text)),
         SendError::Secret(text) => SendError::Secret(without(text)),
     }
+}
+
+/// The text without a piece of the secret, plain or in base64.
+pub(crate) fn without(text: &str, secret: &str) -> String {
+    mask(&mask(text, secret), &STANDARD.encode(secret))
 }
 
 /// Every stretch of the text that stands in the secret as well is left out.

@@ -4,7 +4,7 @@
 
 mod chat;
 mod email;
-mod hide;
+pub(crate) mod hide;
 mod matrix;
 mod request;
 pub(crate) mod secret;
