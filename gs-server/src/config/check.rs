@@ -6,7 +6,7 @@ use mission::id::NameError;
 use mission::{Level, LinkId, SatelliteId, StationId};
 
 use super::links::{AuxInput, LinkKind, LinkSection, ModePinWiring};
-use super::satellites::{LimitSection, SatelliteSection};
+use super::satellites::{CounterSetting, LimitSection, SatelliteSection};
 use super::station::driver_config;
 use super::{Config, ConfigError};
 use crate::storage::Postgres;
@@ -133,6 +133,16 @@ impl Config {
             let remedy = "Write postgres://user@host/database; the password goes into storage.password_file, PGPASSWORD or PGPASSFILE.";
             ConfigError::value("storage.database", problem, remedy)
         })?;
+        // Put back from a dump, the database forgets what any station sealed after it; a station whose own witness stands lower
+        // could not tell, and would seal again with a counter that another has used.
+        for (at, satellite) in self.satellites.iter().enumerate() {
+            ensure(
+                satellite.key_file.is_none() || satellite.counter == CounterSetting::Time,
+                format!("satellites[{at}].counter"),
+                "it counts one by one, and stations share the database",
+                "Use counter = \"time\", or an archive of the station's own.",
+            )?;
+        }
         ensure(
             self.backup.is_none(),
             "backup",

@@ -77,13 +77,16 @@ impl ForwardSection {
         target_url(&self.url)
     }
 
-    /// Where it leads: never more than scheme, host and path.
+    /// Where it leads; of a webhook not the path, which may be all its secret.
     pub fn shown(&self) -> String {
         self.parsed().map_or_else(
             |_| "?".to_owned(),
             |mut url| {
                 url.set_query(None);
                 url.set_fragment(None);
+                if self.kind == ForwardKind::Webhook {
+                    url.set_path("/");
+                }
                 url.to_string()
             },
         )

@@ -165,3 +165,18 @@ fn the_engine_gets_what_the_file_says() {
     assert_eq!(station.satellites[0].profile.heartbeat_period_us, 2_500_000);
     assert!(station.satellites[0].profile.ranges);
 }
+
+#[test]
+fn a_key_that_counts_one_by_one_is_not_shared() {
+    let text = |counter: &str| {
+        format!(
+            "[station]\nname = \"roof\"\n[[satellites]]\nname = \"pixelsat-1\"\nkey_file = \"k\"\ncounter = \"{counter}\"\n[[links]]\nname = \"e22\"\n\
+             satellite = \"pixelsat-1\"\nkind = \"serial\"\nport = \"/dev/ttyUSB0\"\n[storage]\nfolder = \"data\"\n\
+             database = \"postgres://ground@db.example/ground\"\n"
+        )
+    };
+    let check = |counter| Config::from_toml(&text(counter), Path::new("/srv")).unwrap().check();
+    check("time").unwrap();
+    let error = check("sequence").unwrap_err().to_string();
+    assert!(error.contains("key satellites[0].counter: it counts one by one"), "{error}");
+}

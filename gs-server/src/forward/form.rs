@@ -10,6 +10,9 @@ use crate::storage::{ForwardRow, ForwardSubject};
 /// What we call ourselves.
 const VERSION: &str = concat!("PixelSat Ground ", env!("CARGO_PKG_VERSION"));
 
+/// A time that is not known so well is no time of a reception for SiDS, microseconds.
+const TIME_ERROR_MAX_US: i64 = 5_000_000;
+
 /// What stands in every request of a target.
 #[derive(Debug, Clone)]
 pub(crate) struct Sender {
@@ -46,6 +49,10 @@ impl Sender {
             ForwardKind::Sids => {
                 let number = number.ok_or_else(|| format!("{} has no norad_cat_id", row.satellite))?;
                 let place = place.ok_or("nobody said where its receiver stands")?;
+                let error_us = subject.outside.as_deref().map_or(Some(0), |outside| outside.time_error_us);
+                if error_us.is_none_or(|error_us| error_us > TIME_ERROR_MAX_US) {
+                    return Err("its time is not known to 5 s".to_owned());
+                }
                 Ok(sids(row, subject, number, place))
             }
             ForwardKind::Webhook => Ok(self.webhook(row, subject, number, place)),
@@ -80,6 +87,8 @@ impl Sender {
                 "frame": hex(&subject.frame.bytes),
                 "packet_type": subject.frame.packet_type,
                 "received_at": api::Time::from_unix_us(row.received_at_us),
+                "time_basis": outside.map_or("station", |outside| outside.time_basis.as_str()),
+                "time_error_s": outside.and_then(|outside| Some(outside.time_error_us? as f64 / 1e6)),
                 "receiver": row.receiver,
                 "source": row.source,
                 "station": row.station,

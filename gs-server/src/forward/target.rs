@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use mission::UtcUs;
 use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER};
 use reqwest::{Method, Response, StatusCode, Url};
 
@@ -65,14 +66,14 @@ impl Target {
     }
 
     /// One attempt.
-    pub(super) async fn send(&self, row: &ForwardRow, form: &Form) -> Fate {
-        match crate::clock::within(PATIENCE, self.attempt(row, form)).await {
+    pub(super) async fn send(&self, row: &ForwardRow, form: &Form, now: UtcUs) -> Fate {
+        match crate::clock::within(PATIENCE, self.attempt(row, form, now)).await {
             Some(fate) => fate,
             None => Fate::Unsure(format!("no answer within {} s", PATIENCE.as_secs())),
         }
     }
 
-    async fn attempt(&self, row: &ForwardRow, form: &Form) -> Fate {
+    async fn attempt(&self, row: &ForwardRow, form: &Form, now: UtcUs) -> Fate {
         let secret = match &self.secret {
             None => None,
             Some(source) => match source.load().await {
@@ -97,7 +98,8 @@ impl Target {
             }
             (ForwardKind::Sids, None) => {}
             (ForwardKind::Webhook, secret) => {
-                let seconds = (row.made_at_us / 1_000_000).to_string();
+                // Of the attempt: who checks signatures takes none that is minutes old.
+                let seconds = (now.0 / 1_000_000).to_string();
                 let secret = secret.as_deref().map_or("", String::as_str);
                 let signature = match sign(secret, &row.message_id, &seconds, form.body.as_bytes()) {
                     Ok(signature) => signature,
@@ -134,7 +136,8 @@ async fn fate(response: Response) -> Fate {
     let why = format!("it answered {status}{}{}", words(response).await, remedy(status));
     match status.as_u16() {
         400 | 409 | 413 | 422 => Fate::Unwanted(why),
-        429 | 503 => Fate::NotNow(why, pause),
+        429 => Fate::NotNow(why, pause),
+        503 if pause.is_some() => Fate::NotNow(why, pause),
         // Whoever stands in front may have passed it on, and the far end may have kept it before it failed.
         500..=599 => Fate::Unsure(why),
         _ => Fate::NotNow(why, pause),

@@ -55,6 +55,7 @@ pub(crate) fn spawn(parts: &ForwardParts<'_>, life: &Lifecycle) -> ForwardsHandl
             not_before: UtcUs(i64::MIN),
             failures: 0,
             settled: false,
+            unkept: None,
         };
         let (stop, awake) = (life.soft.clone(), parts.timer.busy("forward"));
         life.spawn(format!("frames to {}", section.name), async move {
@@ -110,6 +111,8 @@ struct Forwarder {
     failures: u32,
     /// What an earlier life left under way was looked at.
     settled: bool,
+    /// What became of one that the archive would not take yet.
+    unkept: Option<ForwardRow>,
 }
 
 impl Forwarder {
@@ -120,6 +123,8 @@ impl Forwarder {
                 Err(error) => {
                     let name = &self.target.name;
                     tracing::warn!(target = %name, %error, "what goes to {name} cannot be read or kept: {error}");
+                    self.settled = false;
+                    self.note(&Fate::NotNow(format!("the archive: {error}"), None));
                     self.later()
                 }
             };
@@ -141,6 +146,10 @@ impl Forwarder {
 
     /// Takes up what is new and sends what is due; when to look again.
     async fn round(&mut self, stop: &CancellationToken) -> Result<UtcUs, StoreError> {
+        if let Some(row) = self.unkept.clone() {
+            self.store.keep_forward(&row).await?;
+            self.unkept = None;
+        }
         let mut place = self.store.forward_target(&self.target.name, self.wish.since_us.is_some()).await?;
         if !self.settled {
             self.settle().await?;
@@ -160,6 +169,11 @@ impl Forwarder {
             let now = self.timer.now().utc;
             if self.not_before > now || stop.is_cancelled() {
                 return Ok(self.not_before);
+            }
+            // Somebody may have paused it meanwhile, and waits for nothing more to leave.
+            let place = self.store.find_forward_target(&self.target.name).await?;
+            if place.is_none_or(|place| place.paused_by.is_some()) {
+                return Ok(self.later());
             }
             self.not_before = now.plus(self.pace_us);
             self.one(row, stop).await?;
@@ -189,8 +203,13 @@ impl Forwarder {
 
     /// Sends one: marked as under way before, and what became of it after.
     async fn one(&mut self, row: ForwardRow, stop: &CancellationToken) -> Result<(), StoreError> {
-        let subject = self.store.forward_subject(&row).await?;
-        let form = match self.target.sender.form(&row, &subject) {
+        let form = match self.store.forward_subject(&row).await {
+            Ok(subject) => self.target.sender.form(&row, &subject),
+            // The others are not to wait for it.
+            Err(error @ StoreError::Damaged { .. }) => Err(format!("it cannot be read: {error}")),
+            Err(error) => return Err(error),
+        };
+        let form = match form {
             Ok(form) => form,
             Err(why) => return self.keep(row, &Fate::Unwanted(why)).await,
         };
@@ -211,7 +230,7 @@ impl Forwarder {
 
     /// Waits for the answer, but not for long when the server ends.
     async fn attempt(&self, row: &ForwardRow, form: &Form, stop: &CancellationToken) -> Fate {
-        let sending = self.target.send(row, form);
+        let sending = self.target.send(row, form, self.timer.now().utc);
         tokio::pin!(sending);
         tokio::select! {
             fate = &mut sending => fate,
@@ -222,7 +241,7 @@ impl Forwarder {
         }
     }
 
-    async fn keep(&self, row: ForwardRow, fate: &Fate) -> Result<(), StoreError> {
+    async fn keep(&mut self, row: ForwardRow, fate: &Fate) -> Result<(), StoreError> {
         let (state, error) = match fate {
             Fate::Taken => (ForwardState::Sent, None),
             Fate::Unwanted(why) => (ForwardState::Refused, Some(why)),
@@ -235,7 +254,11 @@ impl Forwarder {
         }
         let sent_at_us = (state == ForwardState::Sent).then(|| self.timer.now().utc.0);
         let row = ForwardRow { state: state.name().to_owned(), error: error.cloned(), sent_at_us, ..row };
-        self.store.keep_forward(&row).await
+        let kept = self.store.keep_forward(&row).await;
+        if kept.is_err() {
+            self.unkept = Some(row);
+        }
+        kept
     }
 
     /// Failures make pauses, and alerts when there are many.

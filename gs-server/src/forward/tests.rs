@@ -237,8 +237,13 @@ async fn a_webhook_is_asked_again_under_the_same_number() {
     for other in &posted {
         assert_eq!(other.body, posted[0].body);
         assert_eq!(other.header("webhook-id"), posted[0].header("webhook-id"));
-        assert_eq!(other.header("webhook-signature"), posted[0].header("webhook-signature"));
+        // Of the attempt, and signed anew: who checks takes nothing that is minutes old.
+        assert!(other.header("webhook-signature").starts_with("v1,"));
     }
+    let seconds =
+        |posted: &crate::alerts::catchers::Posted| posted.header("webhook-timestamp").parse::<i64>().unwrap();
+    assert!(seconds(&posted[tries + 1]) >= seconds(&posted[0]) + 7_200 - 60);
+    assert_ne!(posted[0].header("webhook-signature"), posted[tries + 1].header("webhook-signature"));
     let body: serde_json::Value = serde_json::from_str(&posted[0].body).unwrap();
     assert_eq!(body["id"], posted[0].header("webhook-id"));
     assert_eq!(body["data"]["rssi_dbm"], -107.0);
@@ -261,6 +266,7 @@ async fn refused_ones_hold_up_nobody_and_a_pause_holds_all() {
     let anna = Principal::new("anna");
     assert_eq!(life.handle.pause("db", true, &anna).await.unwrap(), Some(true));
     assert_eq!(life.handle.pause("nobody", true, &anna).await.unwrap(), None);
+    assert_eq!(life.states().await, ["refused"]);
     hook.now_says(201);
     for id in 2..8 {
         life.hear(id).await;
@@ -272,16 +278,33 @@ async fn refused_ones_hold_up_nobody_and_a_pause_holds_all() {
     assert_eq!(hook.count(), 7);
     assert_eq!(life.states().await[1..], ["sent"; 6].map(str::to_owned));
     // The far end is busy: nothing is sent twice, nothing is lost, and it is left alone for longer and longer.
-    hook.now_says(503);
+    hook.now_says(429);
     life.hear(8).await;
     life.pass(10 * MINUTE).await;
     let tries = hook.count() - 7;
     assert!((4..=8).contains(&tries), "{tries} attempts in ten minutes");
-    assert!(life.handle.targets()[0].failing.as_deref().unwrap().contains("503"));
+    assert!(life.handle.targets()[0].failing.as_deref().unwrap().contains("429"));
     hook.now_says(201);
     life.pass(60 * MINUTE).await;
     assert_eq!((life.states().await[7].as_str(), hook.count()), ("sent", 8 + tries));
     assert_eq!(life.handle.targets()[0].failing, None);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_pause_holds_what_is_in_hand_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    secret(&folder);
+    let hook = Hook::saying(201).await;
+    let life = Life::begin(&folder, &target("sids", &hook, "live = true\nper_minute = 6"), BEGIN_US).await;
+    for id in 1..=20 {
+        life.hear(id).await;
+    }
+    life.pass(25).await;
+    let sent = hook.count();
+    assert!((2..=4).contains(&sent), "{sent}");
+    life.handle.pause("db", true, &Principal::new("anna")).await.unwrap();
+    life.pass(10 * MINUTE).await;
+    assert_eq!(hook.count(), sent);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -50,7 +50,8 @@ pub(super) async fn retry(
     let (who, ..) = write.who();
     let again = app.state.forwards.retry(row.id, &who).await?;
     let again = again.ok_or_else(|| {
-        let text = format!("It is {}; only what is unknown or refused can be sent again.", row.state);
+        let text =
+            format!("It is {}; only what is unknown, refused or of a dry run can be sent again.", row.state);
         Failure::new(ProblemKind::TooLate, text)
     })?;
     Ok(Json(view(&again)))

@@ -7,7 +7,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqliteSynchronous};
 use sqlx::{Connection as _, SqliteConnection};
 
 use super::db::{Connection, sql};
-use super::forwards::ForwardRow;
+use super::forwards::{ForwardRow, ForwardTargetRow, newest};
 use super::row::{Row as _, select, upsert};
 use super::rows::MetaRow;
 use super::{DATABASE, StoreError, lite, pg};
@@ -63,6 +63,15 @@ pub async fn doubt_forwards(file: &Path) -> Result<(), StoreError> {
         for row in &waiting {
             let row = ForwardRow { state: "sending".to_owned(), ..ForwardRow::read(row)? };
             row.bind(sql(upsert::<ForwardRow>("id"))).execute(&mut connection).await?;
+        }
+        // What was heard and not taken up yet, by a target that looks every few seconds, may have gone out as well.
+        let targets = sql(select::<ForwardTargetRow>("order by id")).fetch_all(&mut connection).await?;
+        for row in &targets {
+            let row = ForwardTargetRow::read(row)?;
+            let radio_through = newest(&mut connection, "receptions", &row.station).await?;
+            let outside_through = newest(&mut connection, "outside_receptions", &row.station).await?;
+            let row = ForwardTargetRow { radio_through, outside_through, ..row };
+            row.bind(sql(upsert::<ForwardTargetRow>("id"))).execute(&mut connection).await?;
         }
         sql("commit").execute(&mut connection).await?;
     }

@@ -360,11 +360,15 @@ impl Store {
         list.page(self, "id", &query.page).await
     }
 
-    /// One of them.
+    /// One of them; of this station alone.
     ///
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn forward(&self, id: i64) -> Result<Option<ForwardRow>, StoreError> {
+        let own = self.own();
+        if id <= own.after || id >= own.before {
+            return Ok(None);
+        }
         one(self, "where id = $1", id).await
     }
 
@@ -431,7 +435,8 @@ impl Store {
         Ok(changed)
     }
 
-    /// Has a reception sent again that the far end refused, or of which nobody knows. `None`: it is in another state.
+    /// Has a reception sent again that the far end refused, or of which nobody knows; or sent at all, of a dry run. `None`:
+    /// it is in another state, or another station's.
     ///
     /// # Errors
     /// [`StoreError`]; nothing has changed then.
@@ -441,14 +446,18 @@ impl Store {
         who: &Principal,
         at: UtcUs,
     ) -> Result<Option<ForwardRow>, StoreError> {
+        let own = self.own();
         let mut writer = self.0.writer.lock().await;
         let mut connection = writer.begin().await?;
         let before = writer.audit_head().map(|head| head.row);
         let mut transaction = writer.within(&mut connection);
         let result = async {
-            let condition = "where id = $1 and state in ('unknown', 'refused')";
+            let condition =
+                "where id = $1 and state in ('unknown', 'refused', 'dry') and id > $2 and id < $3";
             let found = sql(select::<ForwardRow>(condition))
                 .bind(id)
+                .bind(own.after)
+                .bind(own.before)
                 .fetch_optional(&mut *transaction.connection)
                 .await?;
             let Some(found) = found else { return Ok(None) };
@@ -547,7 +556,11 @@ async fn last(connection: &mut Connection, table: &'static str, own: Own) -> Res
     statement.build().scalar(connection).await
 }
 
-async fn newest(connection: &mut Connection, table: &'static str, station: &str) -> Result<i64, StoreError> {
+pub(super) async fn newest(
+    connection: &mut Connection,
+    table: &'static str,
+    station: &str,
+) -> Result<i64, StoreError> {
     let mut statement = Builder::new(format!("select coalesce(max(id), 0) from {table} where station = "));
     statement.push_bind(station.to_owned());
     statement.build().scalar(connection).await

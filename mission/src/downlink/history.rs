@@ -17,12 +17,16 @@ const PRIOR_PASSES: f64 = 3.0;
 /// The usual share.
 const PRIOR: f64 = 0.3;
 /// Off by this the elements may be, and a receiver's clock, microseconds.
-const SLACK_US: i64 = 60_000_000;
+const SLACK_US: i64 = 90_000_000;
+/// Receivers that are looked at: those that were heard from most often. Names can be made up without end.
+const RECEIVERS_MAX: usize = 1_000;
 
 /// Somebody heard the satellite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeardBy {
-    /// What the receiver is called; what has one name is one receiver.
+    /// What tells the receiver from all others.
+    pub id: String,
+    /// What it is called.
     pub name: String,
     /// Where it stands.
     pub place: Station,
@@ -45,11 +49,14 @@ pub fn listeners(
 ) -> Result<Vec<Listener>, TaskError> {
     let mut receivers: BTreeMap<&str, Vec<&HeardBy>> = BTreeMap::new();
     for one in heard.iter().filter(|one| one.at <= until) {
-        receivers.entry(&one.name).or_default().push(one);
+        receivers.entry(&one.id).or_default().push(one);
     }
+    let mut receivers: Vec<Vec<&HeardBy>> = receivers.into_values().collect();
+    receivers.sort_by_key(|heard| std::cmp::Reverse(heard.len()));
+    receivers.truncate(RECEIVERS_MAX);
     let finder = PassFinder::new(elements)?;
     let mut listeners = Vec::with_capacity(receivers.len());
-    for (name, heard) in receivers {
+    for heard in receivers {
         let times = || heard.iter().map(|one| one.at);
         let (Some(first), Some(last)) = (times().min(), heard.iter().max_by_key(|one| one.at)) else {
             continue;
@@ -72,7 +79,7 @@ pub fn listeners(
         let share = ((in_which - known_by) as f64 + PRIOR * PRIOR_PASSES)
             / ((passes.len() - known_by) as f64 + PRIOR_PASSES);
         listeners.push(Listener {
-            name: name.to_owned(),
+            name: last.name.clone(),
             place: last.place.clone(),
             last_seen: Some(last.at),
             success: Some(share),

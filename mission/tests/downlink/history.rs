@@ -30,7 +30,8 @@ fn shares_are_those_of_the_passes_and_one_lucky_pass_proves_nothing() {
     let place = Station::new(47.0, 8.0, 400.0).unwrap();
     let all = passes(&elements, &place);
     assert!(all.len() > 15, "{}", all.len());
-    let heard = |name: &str, at: UtcUs| HeardBy { name: name.into(), place: place.clone(), at };
+    let heard =
+        |name: &str, at: UtcUs| HeardBy { id: name.into(), name: name.into(), place: place.clone(), at };
     let mut reports = Vec::new();
     for (index, &at) in all.iter().enumerate() {
         // Several frames of a pass are one pass.

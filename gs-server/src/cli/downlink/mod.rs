@@ -56,7 +56,7 @@ The list of stations of TinyGS is such an array. Nothing is scheduled while the 
 which goes the way of every plan.
 
 With --config the elements, the place and the satellite are the station's own, the chunks are those that
-the newest unfinished image misses (or --image), and whoever heard the satellite in the last 30 days is
+the newest unfinished image misses (or --image), and whoever heard the satellite in the last 10 days is
 a station as well, with the share of its passes in which it did. The server must run.
 
 Exit code 1 if no schedule brings anything, 2 if the arguments make no sense."

@@ -13,8 +13,9 @@ use super::Failure;
 use crate::config::Config;
 use crate::elements::Remote;
 
-/// Receptions older than this say nothing of who listens now, microseconds.
-const HISTORY_US: i64 = 30 * 86_400_000_000;
+/// Receptions older than this say little of who listens now, and with elements of today nobody knows in which pass they were,
+/// microseconds.
+const HISTORY_US: i64 = 10 * 86_400_000_000;
 /// Reports that are asked for at most: then the newest count.
 const REPORTS_MAX: usize = 200_000;
 
@@ -95,5 +96,6 @@ fn by(report: &OutsideView) -> Option<HeardBy> {
     let name = report.receiver_name.clone().or_else(|| report.receiver.clone())?;
     let height_m = report.altitude_m.unwrap_or(0.0);
     let place = Station::new(report.latitude_deg?, report.longitude_deg?, height_m).ok()?;
-    Some(HeardBy { name, place, at: UtcUs(report.received_at.unix_us()) })
+    let id = report.receiver.clone().unwrap_or_else(|| name.clone());
+    Some(HeardBy { id, name, place, at: UtcUs(report.received_at.unix_us()) })
 }

@@ -37,7 +37,7 @@ pub(super) fn forwards() -> Vec<Doc> {
             "/api/v1/forwards/{id}/retry",
             "archive",
             "retry_forward",
-            "Send again what is unknown or refused",
+            "Send again what is unknown, refused or of a dry run",
         )
         .body::<Nothing>()
         .json::<ForwardView>()
