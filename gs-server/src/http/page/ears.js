@@ -20,7 +20,7 @@ function paint(receivers, ways) {
   byId("ears").hidden = receivers.length === 0 && ways.length === 0;
   const rows = receivers.slice(0, SHOWN).map(row);
   const head = make("tr");
-  for (const name of ["Receiver", "Last heard", "Frames", "SNR", "State"]) head.append(make("th", "", name));
+  for (const name of ["Receiver", "Heard", "Frames", "SNR dB", ""]) head.append(make("th", "", name));
   byId("ear-list").replaceChildren(...(rows.length > 0 ? [head, ...rows] : []));
   const troubled = ways.filter((way) => way.state !== "working" || way.note !== null);
   const notes = troubled.map((way) => `${way.name}: ${way.state}${words(way)}`);
@@ -35,9 +35,10 @@ function row(receiver) {
   const name = make("td", "clip", receiver.name ?? receiver.id);
   name.title = `${receiver.id}, by ${receiver.sources.join(", ") || "its own word"}`;
   const at = ms(receiver.last_heard_at);
-  const heard = make("td", "num", at === null ? "—" : clock(at));
+  const today = at !== null && Date.now() - at < 86400e3;
+  const heard = make("td", "num", at === null ? "—" : today ? clock(at) : date(at).slice(0, 10));
   if (at !== null) heard.title = `${date(at)}, ${span(Date.now() - at)} ago`;
-  const snr = receiver.median_snr_db === null ? "—" : `${receiver.median_snr_db.toFixed(1)} dB`;
+  const snr = receiver.median_snr_db === null ? "—" : receiver.median_snr_db.toFixed(1);
   tr.append(name, heard, make("td", "num", String(receiver.frames)), make("td", "num", snr), make("td", "", state(receiver.board)));
   return tr;
 }
