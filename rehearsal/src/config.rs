@@ -77,6 +77,9 @@ pub struct Strangers {
     pub hear: f64,
     /// How long after the frame their report comes, seconds.
     pub delay_s: f64,
+    /// They hear in other passes than ours: nothing while the satellite is in our view. For them the satellite is given a
+    /// schedule in each of our passes, of gaps that the image has then.
+    pub abroad: bool,
 }
 
 /// What goes wrong on the ground.

@@ -32,10 +32,13 @@ pub(crate) fn device(config: &mut WorldConfig, rng: &mut ChaCha8Rng, key: &Key) 
         twin.first_heartbeat_us = known.first_heartbeat_us;
         model = ModelConfig::prepared(known.profile.rssi);
         (model.phy, timing, address) = (known.timing.phy, known.timing, Some(known.profile.address));
-        // A satellite in service: its clock was set, and it has its elements.
+        // A satellite in service has its elements.
+        state.elements = true;
+    }
+    if config.known.is_some() || config.strangers.is_some_and(|who| who.abroad) {
+        // In service, and of schedules: its clock was set.
         let utc_ms = config.utc_at_zero_ms;
         state.clock = Some(ClockSetting { set_ms: utc_ms, at_utc_ms: utc_ms });
-        state.elements = true;
     }
     let made = DeviceConfig::new(twin, config.channel.clone(), model);
     let satellite_address = address.unwrap_or(made.satellite_address);

@@ -46,6 +46,12 @@ pub struct Report {
     pub kills: u64,
     /// Frames that others reported.
     pub reported: u64,
+    /// Chunks that others reported.
+    pub chunks_reported: u64,
+    /// Those of them that were reported while the satellite was in view.
+    pub chunks_reported_in_view: u64,
+    /// Scheduled transmissions that the satellite began.
+    pub scheduled: u64,
     /// Passes that were seen to their end.
     pub passes: u64,
     /// SHA-256 of everything that happened, as hex: equal for equal seeds.

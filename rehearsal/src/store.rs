@@ -270,6 +270,21 @@ impl Store {
         u64::try_from(self.chunks.len()).unwrap_or(u64::MAX)
     }
 
+    /// Gaps of the current image, first chunk and count, in their order.
+    pub(crate) fn gaps(&self) -> Vec<(u16, u16)> {
+        let chunks = self.image().map_or(0, |(record, _)| record.chunks);
+        let mut gaps: Vec<(u16, u16)> = Vec::new();
+        for index in
+            (0..u16::try_from(chunks).unwrap_or(u16::MAX)).filter(|index| !self.chunks.contains_key(index))
+        {
+            match gaps.last_mut() {
+                Some((first, count)) if *first + *count == index => *count += 1,
+                _ => gaps.push((index, 1)),
+            }
+        }
+        gaps
+    }
+
     /// Chunks asked for, and bridged ones among them, over all downloads.
     pub(crate) fn chunks_requested(&self) -> (u64, u64, u64) {
         self.downloads.values().fold((0, 0, 0), |(requests, asked, bridged), d| {

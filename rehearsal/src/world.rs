@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 
-use mission::reception::Delivered;
 use mission::{
     Accepted, Batch, BatchId, CounterRule, Effect, Entropy, Input, Intent, IntentEnvelope, IntentId,
     LinkConfig, LinkId, LinkState, MaybeRadiated, MonoUs, Now, Principal, Profile, SatelliteConfig,
@@ -23,6 +22,8 @@ use crate::parts::{device, driver_config, named, named_link, station_name};
 use crate::report::Report;
 use crate::store::Store;
 use crate::strangers::Reports;
+
+mod abroad;
 
 /// Seeded bytes for the engine.
 struct Seeded(ChaCha8Rng);
@@ -172,6 +173,7 @@ impl World {
             uplinks: stats.ground_packets,
             airtime_up_s: stats.airtime_up_us as f64 / 1e6,
             airtime_down_s: stats.airtime_down_us as f64 / 1e6,
+            scheduled: stats.twin.scheduled,
             images_equal: self.images_equal(),
             images_complete: self.store.images_complete,
             image_chunks: self.store.image().map_or(0, |(record, _)| u64::from(record.chunks)),
@@ -293,7 +295,7 @@ impl World {
             JournalEntry::SatelliteSent { at_us, end_us, frame } => {
                 self.note(frame);
                 self.their_air_us = (*at_us, *end_us);
-                self.reports.sent(*end_us, frame);
+                self.reports.sent(*end_us, frame, self.in_view);
                 let heard = self.in_view && overlap(self.our_air_us, self.their_air_us);
                 self.report.collisions += u64::from(heard);
             }
@@ -309,6 +311,7 @@ impl World {
         }
         self.in_view = in_view;
         self.report.passes += u64::from(!in_view);
+        self.reports.view(in_view, self.now_us);
         self.plan_chaos();
         if self.config.view_is_known {
             self.tell_view();
@@ -393,22 +396,6 @@ impl World {
             }
         }
         Ok(())
-    }
-
-    /// What others report by now.
-    fn strangers_step(&mut self) {
-        let due = self.reports.due(self.now_us);
-        if due.is_empty() {
-            return;
-        }
-        let at_us = |us: u64| UtcUs(self.utc_at_zero_us + i64::try_from(us).unwrap_or(i64::MAX));
-        let now = self.now().utc;
-        let delivered: Vec<Delivered> = due
-            .iter()
-            .filter_map(|heard| heard.delivered(&self.satellite, at_us(heard.end_us), now))
-            .collect();
-        self.report.reported += delivered.len() as u64;
-        self.tell(Input::Outside { delivery: self.now_us, receptions: &delivered });
     }
 
     /// A new life of the engine, from what the store holds.
