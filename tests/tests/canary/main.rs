@@ -112,7 +112,7 @@ fn live(folder: &Folder, client: &Client) {
         let is_over = |run: &RunView| run.started_at.is_some() && run.outcome.is_some();
         (rehearsal.state == "done" && runs.items.iter().any(is_over)).then_some(())
     });
-    for of in ["reports/passes/1", "alerts/1", "approvals/1", "runs/1"] {
+    for of in ["reports/passes/1", "alerts/1", "approvals/1", "runs/1", "forwards/1"] {
         until(&format!("there is {of}"), 4 * PATIENCE, || {
             client.get(&format!("/api/v1/{of}")).is_ok_and(|answer| answer.status == 200).then_some(())
         });
@@ -184,6 +184,10 @@ fn secrets_stay(folder: &mut Folder, archive: &Archive, own: &[&str]) {
     for answer in answers {
         assert_eq!(find(&answer.body, &spellings), None, "in an answer");
     }
+    until("something was passed on, and refused", 4 * PATIENCE, || {
+        let answer = client.get("/api/v1/forwards/1").ok()?;
+        (answer.status == 200 && answer.text().contains("[secret]")).then_some(())
+    });
     correspondents.are_told(&client);
     live(folder, &client);
     over_tls(folder, &spellings);

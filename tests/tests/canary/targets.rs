@@ -11,8 +11,9 @@ use end_to_end::{Client, Folder};
 use super::search::{Spellings, base64, find, words};
 
 const PASSWORD: &str = "Vb3-another-unlikely-one-9Tq";
-const SIGNATURE: &str = "Hx7-key-of-all-signatures-4Lp";
+const SIGNATURE: &str = "Hx7-key-of-all-the-seals-4Lp";
 const ACCESS: &str = "syt_Zr2-access-to-a-room-8Wk";
+const FORWARD: &str = "Gm2-token-for-the-world-7Px";
 const SLACK: &str = "Ns6SlackAddressNobodyGuesses1Jd";
 const DISCORD: &str = "Yt9DiscordAddressNobodyGuesses5Fm";
 
@@ -68,23 +69,27 @@ impl WebCatcher {
 pub(crate) struct Correspondents {
     mail: MailCatcher,
     web: WebCatcher,
+    /// Where frames are passed on to; never in a good mood.
+    world: WebCatcher,
 }
 
 impl Correspondents {
     /// The files with their secrets.
-    pub(crate) const FILES: [&str; 5] =
-        ["mail.password", "webhook.key", "matrix.token", "slack.address", "discord.address"];
+    pub(crate) const FILES: [&str; 6] =
+        ["mail.password", "webhook.key", "matrix.token", "slack.address", "discord.address", "forward.token"];
     const TARGETS: [&str; 5] = ["mail", "webhook", "matrix", "slack", "discord"];
 
     /// Listens, and makes a station of this folder write to them.
     pub(crate) fn of(folder: &mut Folder) -> Self {
-        let (mail, web) = (MailCatcher::start(), WebCatcher::start());
+        let (mail, web, world) = (MailCatcher::start(), WebCatcher::start(), WebCatcher::start());
+        world.refuses.store(true, Ordering::Relaxed);
         let secrets = [
             PASSWORD.to_owned(),
             SIGNATURE.to_owned(),
             ACCESS.to_owned(),
             format!("http://{}/services/T0/B0/{SLACK}", web.address),
             format!("http://{}/api/webhooks/1/{DISCORD}", web.address),
+            FORWARD.to_owned(),
         ];
         for (name, secret) in Self::FILES.iter().zip(secrets) {
             folder.write_key(name, &format!("{secret}\n"), 0o600);
@@ -109,7 +114,12 @@ impl Correspondents {
         for (place, name) in Self::TARGETS.iter().enumerate() {
             folder.sections += &target(name, kinds[place], Self::FILES[place], &more[place]);
         }
-        Self { mail, web }
+        folder.sections += &format!(
+            "[[forward]]\nname = \"world\"\nkind = \"sids\"\nreceiver = \"N0CALL\"\nlive = true\nsecret_file = \"forward.token\"\n\
+             url = \"http://{}/\"\n",
+            world.address
+        );
+        Self { mail, web, world }
     }
 
     /// What must be found nowhere.
@@ -122,6 +132,7 @@ impl Correspondents {
             ("password in base64", base64(PASSWORD.as_bytes())),
             ("key of signatures", SIGNATURE.to_owned()),
             ("access token", ACCESS.to_owned()),
+            ("token of the world", FORWARD.to_owned()),
             ("address at Slack", SLACK.to_owned()),
             ("address at Discord", DISCORD.to_owned()),
         ])
@@ -141,6 +152,8 @@ impl Correspondents {
         for wanted in [ACCESS, SLACK, DISCORD, "webhook-signature"] {
             assert!(said.contains(wanted), "{wanted} was never used: {said}");
         }
+        let world = self.world.said.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        assert!(world.contains(FORWARD), "nothing was passed on: {world}");
         let mails = self.mail.said().join("\n");
         assert!(find(mails.as_bytes(), &Self::spellings()).is_some(), "the password was never used: {mails}");
         self.web.refuses.store(true, Ordering::Relaxed);
