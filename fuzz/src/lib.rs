@@ -1,4 +1,4 @@
-//! One fuzz body per decoder of the wire, of what a radio module answers, and of elements. A body takes any bytes and asserts what
+//! One fuzz body per decoder of the wire, of what a radio module answers, of elements and of reports. A body takes any bytes and asserts what
 //! must hold for all bytes: no panic, bounds, round trips, and for the stream decoders the same result as a naive reading
 //! of the ICD.
 //!
@@ -8,6 +8,7 @@
 
 mod down;
 mod elements;
+mod formats;
 mod radio_driver;
 mod radio_reply;
 mod reception;
@@ -15,6 +16,7 @@ mod up;
 
 pub use down::{down_frame, down_stream, downlink_payload};
 pub use elements::elements;
+pub use formats::formats;
 pub use radio_driver::radio_driver;
 pub use radio_reply::radio_reply;
 pub use reception::reception;
@@ -24,7 +26,7 @@ pub use up::{sealed_open, telecommand_payload, up_stream};
 pub type Body = fn(&[u8]);
 
 /// Every body by the name of its corpus folder and fuzz target.
-pub const BODIES: [(&str, Body); 10] = [
+pub const BODIES: [(&str, Body); 11] = [
     ("down_stream", down_stream),
     ("down_frame", down_frame),
     ("downlink_payload", downlink_payload),
@@ -35,6 +37,7 @@ pub const BODIES: [(&str, Body); 10] = [
     ("radio_driver", radio_driver),
     ("elements", elements),
     ("reception", reception),
+    ("formats", formats),
 ];
 
 /// Feeds a stream in pieces whose lengths a few input bytes choose.

@@ -106,6 +106,8 @@ pub struct Station {
     ids: LastIds,
     last_tx: u64,
     recent: Recents,
+    /// Frames of the delivery at hand that nothing was told of alone.
+    kept_raw: u64,
     synchronised: bool,
     vouched: bool,
     stopping: bool,

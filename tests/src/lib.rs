@@ -15,6 +15,7 @@
 //! | [`watch`], [`operator`] | somebody who remembers what the server published; somebody who commands |
 //! | [`guide`], [`terminal`] | a page of the documentation as a list of things to do; the terminals to do them in |
 //! | [`mail`] | a mail catcher |
+//! | [`reports`] | reports of volunteers' stations, made up |
 //! | [`wait`] | waiting for the real world |
 //!
 //! Everything here is as far outside the server as an operator is: it knows the wire types (`api`), the radio link
@@ -32,6 +33,7 @@ pub mod operator;
 pub mod overhead;
 pub mod process;
 pub mod pty;
+pub mod reports;
 pub mod strace;
 pub mod stream;
 pub mod terminal;

@@ -11,9 +11,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use mission::reception::Receiver;
 use mission::{Clock as _, SatelliteId, UtcUs};
 use serde::Serialize;
+use tokio_util::sync::CancellationToken;
 
 use super::serve::failure;
-use super::shell::{print_json, print_line, runtime};
+use super::shell::{print_json, print_line, runtime, signals};
 use super::{Exit, Failure};
 use crate::config::Config;
 use crate::elements::{Offline, Remote};
@@ -63,10 +64,15 @@ pub struct Import {
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
+    /// Set by Ctrl-C: ends after what is being stored.
+    #[arg(skip)]
+    stop: CancellationToken,
 }
 
 #[derive(Serialize)]
 struct Done {
+    /// It was broken off in order; the same command again goes on.
+    stopped: bool,
     files: Vec<OfFile>,
     #[serde(flatten)]
     sum: Sum,
@@ -84,15 +90,19 @@ impl Import {
     pub(super) fn run(self) -> Result<Exit, Failure> {
         let config = Config::load(&self.config).map_err(Failure::usage)?;
         config.check().map_err(Failure::usage)?;
-        runtime()?.block_on(self.import(&config))
+        runtime()?.block_on(async {
+            signals(&self.stop, || {})?;
+            self.import(&config).await
+        })
     }
 
     async fn import(&self, config: &Config) -> Result<Exit, Failure> {
         let satellite = self.satellite(config)?;
-        let mut done = Done { files: Vec::new(), sum: Sum::default() };
+        let mut done = Done { stopped: false, files: Vec::new(), sum: Sum::default() };
         match Offline::open(config).await {
             Ok(offline) => {
                 let store = offline.door.store.clone();
+                store.make_room().await.map_err(|error| failure(error.into()))?;
                 let ears = Ears::new(store, offline.inbox.clone(), offline.timer.clone());
                 let context = self.context(config, &satellite, offline.timer.now().utc);
                 let taker = Taker::Here(ears, satellite.clone());
@@ -144,6 +154,10 @@ impl Import {
             let (format, sum) = self.file(path, taker, context).await?;
             done.sum.add(&sum);
             done.files.push(OfFile { file: path.display().to_string(), format: format.name(), sum });
+            if self.stop.is_cancelled() {
+                done.stopped = true;
+                break;
+            }
         }
         Ok(())
     }
@@ -161,9 +175,9 @@ impl Import {
         };
         let bar =
             if std::io::stderr().is_terminal() { ProgressBar::new(length) } else { ProgressBar::hidden() };
-        let style = ProgressStyle::with_template("{bar:40} {bytes} of {total_bytes}, {eta} left, {msg}");
+        let style = ProgressStyle::with_template("{bar:30} {bytes} of {total_bytes}, {eta} left, {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let sum = bulk::import(format, bar.wrap_read(reader), context, taker, &bar).await;
+        let sum = bulk::import(format, bar.wrap_read(reader), context, taker, (&bar, &self.stop)).await;
         bar.finish_and_clear();
         sum.map(|sum| (format, sum)).map_err(|error| error.of_file(path))
     }
@@ -183,6 +197,10 @@ impl Import {
         }
         for (reason, count) in &done.sum.reasons {
             eprintln!("gs-server: {count} refused: {reason}");
+        }
+        if done.stopped {
+            eprintln!("gs-server: stopped; what was read so far is stored, the same command again goes on");
+            return Ok(Exit::Failed);
         }
         let read = done.sum.frames + done.sum.merged + done.sum.without_frame + done.sum.repeated;
         Ok(if read == 0 { Exit::Failed } else { Exit::Done })

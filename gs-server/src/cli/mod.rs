@@ -15,6 +15,7 @@ mod doctor;
 mod downlink;
 mod ears;
 mod elements;
+mod export;
 mod failure;
 mod fit;
 mod forward;
@@ -165,6 +166,8 @@ pub enum Command {
     Ears(ears::ListEars),
     /// Bring in what others heard: files of TinyGS, SatNOGS, KISS, hex
     Import(import::Import),
+    /// Write receptions out: what others reported, what our own stations heard
+    Export(export::Export),
     /// Derive every value again from the raw frames
     Redecode(redecode::Redecode),
 }
@@ -225,6 +228,7 @@ impl Cli {
             Command::Report(report) => report.run(),
             Command::Ears(ears) => ears.run(),
             Command::Import(import) => import.run(),
+            Command::Export(export) => export.run(),
             Command::Redecode(redecode) => redecode.run(),
         }
     }

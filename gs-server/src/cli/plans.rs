@@ -28,7 +28,7 @@ pub(super) fn failure(error: RemoteError) -> Failure {
         RemoteError::NoAnswer { url, why } => {
             Failure::failed(format!("no server answers at {url} ({why}): start it with `gs-server serve`"))
         }
-        RemoteError::Refused(_) | RemoteError::Token(_) => Failure::refused(error),
+        RemoteError::Refused(_) | RemoteError::Busy(_) | RemoteError::Token(_) => Failure::refused(error),
         RemoteError::NoPort => Failure::usage(error),
         RemoteError::Client(_) | RemoteError::Strange { .. } => Failure::failed(error),
     }

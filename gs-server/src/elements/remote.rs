@@ -48,6 +48,9 @@ pub enum RemoteError {
     /// It says no.
     #[error("the server refuses: {0}")]
     Refused(String),
+    /// Not now.
+    #[error("the server is busy: {0}")]
+    Busy(String),
     /// Its answer is of another version, or of somebody else.
     #[error("the answer of {url} is not understood ({why}): is it this program, of the same version?")]
     Strange {
@@ -273,6 +276,9 @@ impl Remote {
         }
         if !status.is_success() {
             return Err(match serde_json::from_slice::<Problem>(&body) {
+                Ok(problem) if problem.known_kind() == Some(api::ProblemKind::Overloaded) => {
+                    RemoteError::Busy(problem.detail)
+                }
                 Ok(problem) => RemoteError::Refused(problem.detail),
                 Err(_) => strange(format!("status {status}")),
             });

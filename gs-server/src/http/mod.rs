@@ -195,6 +195,8 @@ struct App {
     feed: stream::Feed,
     /// Turns of those who compute something long.
     computing: Arc<Semaphore>,
+    /// Turns of those who hand reports in.
+    reports: Arc<Semaphore>,
     rehearsals: Arc<rehearsals::Rehearsals>,
 }
 
@@ -207,6 +209,7 @@ pub fn router(state: HttpState, allowed_hosts: AllowedHosts) -> Router {
         streams: Arc::new(Semaphore::new(streams_max)),
         feed: stream::Feed::new(),
         computing: Arc::new(Semaphore::new(sky::COMPUTING_MAX)),
+        reports: Arc::new(Semaphore::new(receptions::AT_ONCE)),
         rehearsals: Arc::default(),
     };
     tokio::spawn(app.feed.clone().run(app.clone(), stop));

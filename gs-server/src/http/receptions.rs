@@ -1,10 +1,14 @@
 //! `/api/v1/receptions` and `/api/v1/ears`: what others heard, what they are counted by, and reports that are handed in.
 
+use std::sync::Arc;
+
 use api::{EarView, ImportReport, ImportRequest, OutsideView, Page, ProblemKind, Time};
 use axum::Json;
-use axum::extract::State;
+use axum::extract::{Request, State};
+use axum::middleware::Next;
+use axum::response::{IntoResponse as _, Response};
 use mission::UtcUs;
-use mission::reception::{Ear, Receiver};
+use mission::reception::{Ear, Receiver, Refusal};
 
 use super::App;
 use super::extract::{Query, list_query, number, paged, satellite, small, time, whole};
@@ -14,6 +18,10 @@ use crate::ingest::formats::{self, Context, Format, Item, RECEPTION_MAX};
 use crate::ingest::{EarsError, Outcome};
 use crate::storage::{OutsideQuery, OutsideRow};
 
+/// Where reports are, and where they are handed in.
+pub(super) const PATH: &str = "/api/v1/receptions";
+/// So many may hand reports in at once: what is read of a request takes memory.
+pub(super) const AT_ONCE: usize = 1;
 /// What a reception may be.
 const KINDS: [&str; 4] = ["frame", "repairable", "damaged", "detection"];
 
@@ -66,12 +74,24 @@ pub(super) async fn ears(State(app): State<App>) -> Json<Page<EarView>> {
     Json(whole(views.collect()))
 }
 
+/// Before anything of the reports is read: whoever comes while there is no room comes again.
+pub(super) async fn gate(State(app): State<App>, request: Request, next: Next) -> Response {
+    match Arc::clone(&app.reports).try_acquire_owned() {
+        Ok(_turn) => next.run(request).await,
+        Err(_) => {
+            app.state.ears.refuse(Ear::File, Refusal::NoRoom);
+            let why = "Others are handing reports in: what the radio hears goes first. Send the same again in a second.";
+            Failure::new(ProblemKind::Overloaded, why).into_response()
+        }
+    }
+}
+
 /// Takes reports in. The same reports again change nothing, under whatever idempotency key.
 pub(super) async fn import(
     State(app): State<App>,
     write: Write<ImportRequest>,
 ) -> Result<Json<ImportReport>, Failure> {
-    let ImportRequest { satellite: named, receiver, at, items } = &write.body;
+    let ImportRequest { satellite: named, receiver, at, items } = write.into_body();
     let id = satellite(&app, named.as_deref())?;
     let mut context = Context::file(app.state.aliases.admission(&id, app.state.ears.now()));
     context.receiver = Receiver { id: receiver.clone(), name: receiver.clone(), ..Receiver::default() };
@@ -84,18 +104,18 @@ pub(super) async fn import(
         let format = Format::named(&item.format).ok_or_else(|| {
             bad("format", format!("'{}' is none of json, satnogs-csv, kiss, hex, raw", item.format))
         })?;
-        let body = match (&item.text, &item.hex) {
-            (Some(text), None) => text.clone().into_bytes(),
+        let body = match (item.text, item.hex) {
+            (Some(text), None) => text.into_bytes(),
             (None, Some(digits)) => hex::decode(digits).map_err(|error| bad("hex", error.to_string()))?,
             _ => return Err(bad("text", "one of text and hex must be there".into())),
         };
         let body = if body.len() > formats::PACKET_MAX.max(RECEPTION_MAX) {
-            Err(mission::reception::Refusal::TooLong)
+            Err(Refusal::TooLong)
         } else {
             Ok(body)
         };
         let occurrence = item.occurrence.unwrap_or(1);
-        let prefix = item.topic.clone();
+        let prefix = item.topic;
         if format == Format::Json {
             // What is inside is cut and bounded as in a file.
             let body = body.unwrap_or_default();

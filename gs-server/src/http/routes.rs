@@ -47,6 +47,12 @@ impl Route {
             Access::Door => self.handler.route_layer(from_fn(guard_door)),
             Access::Read | Access::Stream => self.handler,
         };
+        let handler = match (self.path, self.access) {
+            (receptions::PATH, Access::Write) => {
+                handler.route_layer(from_fn_with_state(app.clone(), receptions::gate))
+            }
+            _ => handler,
+        };
         let door = (app.clone(), self.policy, self.access);
         router.route(self.path, handler.route_layer(from_fn_with_state(door, admit)))
     }
@@ -111,8 +117,8 @@ pub(super) fn table() -> Vec<Route> {
         read("/api/v1/antenna", Needs(Look), antenna::get),
         read("/api/v1/frames", Needs(Look), frames::list),
         read("/api/v1/frames/{id}", Needs(Look), frames::get),
-        read("/api/v1/receptions", Needs(Look), receptions::list),
-        write("/api/v1/receptions", Needs(Plan), receptions::import),
+        read(receptions::PATH, Needs(Look), receptions::list),
+        write(receptions::PATH, Needs(Plan), receptions::import),
         read("/api/v1/ears", Needs(Look), receptions::ears),
         read("/api/v1/ears/ways", Needs(Look), receivers::ways),
         read("/api/v1/receivers", Needs(Look), receivers::list),

@@ -24,6 +24,8 @@ use crate::people::Caller;
 
 /// Bytes that a body may have.
 pub(super) const BODY_MAX: usize = 64 * 1024;
+/// Bytes of reports that are handed in together.
+pub(super) const REPORTS_MAX: usize = 512 * 1024;
 /// Characters that an idempotency key may have.
 const KEY_MAX: usize = 128;
 
@@ -70,8 +72,9 @@ async fn check(request: Request, wants_key: bool) -> Result<Request, Failure> {
     if declared.is_some() && !is_json {
         return Err(wrong_media_type());
     }
-    let body = to_bytes(body, BODY_MAX).await.map_err(|_| {
-        Failure::new(ProblemKind::BodyTooLarge, format!("A body may have {BODY_MAX} bytes at most."))
+    let most = if parts.uri.path() == super::receptions::PATH { REPORTS_MAX } else { BODY_MAX };
+    let body = to_bytes(body, most).await.map_err(|_| {
+        Failure::new(ProblemKind::BodyTooLarge, format!("A body may have {most} bytes at most."))
     })?;
     let body = match body.is_empty() {
         true => Value::Object(serde_json::Map::new()),
@@ -133,6 +136,13 @@ pub(super) struct Write<T> {
     /// What was sent.
     pub(super) body: T,
     checked: Checked,
+}
+
+impl<T> Write<T> {
+    /// What was sent, and nothing else: what was kept of the request is let go.
+    pub(super) fn into_body(self) -> T {
+        self.body
+    }
 }
 
 impl<T: DeserializeOwned> FromRequestParts<App> for Write<T> {

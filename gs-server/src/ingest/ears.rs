@@ -1,22 +1,24 @@
 //! The one way of reports into the archive: what is known already is left out, the rest goes to the engine, and what was
 //! refused is counted by its reason.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use mission::reception::{Delivered, Ear, NotTaken, Reception, Refusal, Taken};
+use mission::reception::{Ear, NotTaken, Reception, Refusal, Taken};
 use mission::{SatelliteId, UtcUs};
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::Semaphore;
 
+use super::delivery::Delivery;
 use super::formats::Read;
 use crate::clock::Timer;
-use crate::engine::{EngineInbox, EngineMessage};
+use crate::engine::EngineInbox;
 use crate::storage::{Store, StoreError};
 
 /// Reports that go to the engine together.
 pub const TOGETHER: usize = 1_000;
-/// Between two tries, microseconds.
-const AGAIN_US: u64 = 1_000_000;
+/// The same where no radio waits behind them. The engine remembers twice as many frames, so that none of the part under
+/// way is missed.
+pub const TOGETHER_ALONE: usize = 4_000;
 /// Deliveries under way at once, of all sources; others wait.
 const UNDER_WAY: usize = 3;
 
@@ -83,7 +85,7 @@ struct Inner {
     store: Store,
     engine: EngineInbox,
     timer: Arc<dyn Timer>,
-    room: Semaphore,
+    room: Arc<Semaphore>,
     counts: Mutex<BTreeMap<Ear, EarCounts>>,
 }
 
@@ -91,7 +93,7 @@ impl Ears {
     /// A way into this archive, by this engine.
     pub fn new(store: Store, engine: EngineInbox, timer: Arc<dyn Timer>) -> Self {
         let counts = Mutex::new(BTreeMap::new());
-        Self(Arc::new(Inner { store, engine, timer, room: Semaphore::new(UNDER_WAY), counts }))
+        Self(Arc::new(Inner { store, engine, timer, room: Arc::new(Semaphore::new(UNDER_WAY)), counts }))
     }
 
     /// The time now, by the station's clock.
@@ -124,31 +126,26 @@ impl Ears {
         found: Vec<Read>,
         patience: u32,
     ) -> Result<Outcome, EarsError> {
-        let mut outcome = Outcome::default();
-        let mut receptions = Vec::new();
-        for read in found {
-            match read {
-                Ok(reception) => receptions.push(reception),
-                Err(refused) => {
-                    outcome.refused += 1;
-                    self.count(ear, |counts| *counts.refused.entry(refused.reason.name()).or_default() += 1);
-                }
-            }
-        }
-        while !receptions.is_empty() {
-            let rest = receptions.split_off(receptions.len().min(TOGETHER));
-            let part = self.together(satellite, std::mem::replace(&mut receptions, rest), patience).await?;
-            outcome.add(&part);
-        }
-        let now = self.now();
-        self.count(ear, |counts| {
-            counts.outcome.add(&outcome);
-            counts.last_at = Some(now);
-            if outcome.frames + outcome.merged + outcome.without_frame > 0 {
-                counts.last_new_at = Some(now);
-            }
-        });
+        let mut delivery = self.deliver(satellite, ear, TOGETHER, patience).await?;
+        let mut outcome = delivery.push(found).await?;
+        outcome.add(&delivery.end().await?);
         Ok(outcome)
+    }
+
+    /// Begins a delivery of many reports, of which `together` go to the engine at a time. It waits while as many others
+    /// are under way as may be.
+    ///
+    /// # Errors
+    /// [`EarsError::Ending`].
+    pub async fn deliver(
+        &self,
+        satellite: &SatelliteId,
+        ear: Ear,
+        together: usize,
+        patience: u32,
+    ) -> Result<Delivery, EarsError> {
+        let room = Arc::clone(&self.0.room).acquire_owned().await.map_err(|_| EarsError::Ending)?;
+        Ok(Delivery::new(self.clone(), (satellite.clone(), ear), (together, patience), room))
     }
 
     /// What was counted, by ear.
@@ -161,46 +158,50 @@ impl Ears {
         self.count(ear, |counts| *counts.refused.entry(reason.name()).or_default() += 1);
     }
 
+    /// Counts reports for which there was no room.
+    pub(super) fn no_room(&self, ear: Ear, reports: usize) {
+        self.count(ear, |counts| {
+            *counts.refused.entry(Refusal::NoRoom.name()).or_default() += reports as u64;
+        });
+    }
+
     fn count(&self, ear: Ear, change: impl FnOnce(&mut EarCounts)) {
         change(self.0.counts.lock().unwrap_or_else(PoisonError::into_inner).entry(ear).or_default());
     }
 
-    async fn together(
-        &self,
-        satellite: &SatelliteId,
-        receptions: Vec<Reception>,
-        patience: u32,
-    ) -> Result<Outcome, EarsError> {
-        let _room = self.0.room.acquire().await.map_err(|_| EarsError::Ending)?;
-        let came = receptions.len() as u64;
-        for reception in &receptions {
-            if !reception.doubts.is_empty() {
-                self.count(reception.ear, |counts| {
-                    for doubt in reception.doubts.iter() {
-                        *counts.doubts.entry(doubt.name()).or_default() += 1;
-                    }
-                });
-            }
-        }
-        let delivered = new_ones(&self.0.store, satellite, receptions).await?;
-        let repeated = came - delivered.len() as u64;
-        if delivered.is_empty() {
-            return Ok(Outcome { repeated, ..Outcome::default() });
-        }
-        let mut tries = patience;
-        loop {
-            let (answer, answered) = oneshot::channel();
-            self.0.engine.send(EngineMessage::Outside { receptions: delivered.clone(), answer }).await;
-            match answered.await.map_err(|_| EarsError::Ending)? {
-                Ok(taken) => return Ok(Outcome { repeated, ..Outcome::from(taken) }),
-                Err(NotTaken::Busy) if tries > 0 => {
-                    tries -= 1;
-                    let at = self.0.timer.now().mono.plus(AGAIN_US);
-                    drop(self.0.timer.sleep_until(at).await);
+    /// Counts what was not believed of reports.
+    pub(super) fn doubt(&self, receptions: &[Reception]) {
+        for reception in receptions.iter().filter(|reception| !reception.doubts.is_empty()) {
+            self.count(reception.ear, |counts| {
+                for doubt in reception.doubts.iter() {
+                    *counts.doubts.entry(doubt.name()).or_default() += 1;
                 }
-                Err(refusal) => return Err(refusal.into()),
-            }
+            });
         }
+    }
+
+    /// Counts what reports came to.
+    pub(super) fn took(&self, ear: Ear, outcome: &Outcome) {
+        let now = self.now();
+        self.count(ear, |counts| {
+            counts.outcome.add(outcome);
+            counts.last_at = Some(now);
+            if outcome.frames + outcome.merged + outcome.without_frame > 0 {
+                counts.last_new_at = Some(now);
+            }
+        });
+    }
+
+    pub(super) fn timer(&self) -> &Arc<dyn Timer> {
+        &self.0.timer
+    }
+
+    pub(super) fn store(&self) -> &Store {
+        &self.0.store
+    }
+
+    pub(super) fn engine(&self) -> &EngineInbox {
+        &self.0.engine
     }
 }
 
@@ -213,29 +214,4 @@ impl From<Taken> for Outcome {
             ..Self::default()
         }
     }
-}
-
-/// Those of these reports that the archive does not have, with the frames that it does.
-async fn new_ones(
-    store: &Store,
-    satellite: &SatelliteId,
-    receptions: Vec<Reception>,
-) -> Result<Vec<Delivered>, StoreError> {
-    let all: Vec<&Reception> = receptions.iter().collect();
-    let known = store.known_reports(&all).await?;
-    let mut seen = HashSet::new();
-    let new: Vec<Reception> = receptions
-        .into_iter()
-        .filter(|report| {
-            let key = (report.ear, report.source_id.clone(), report.receiver_id().to_owned());
-            !known.contains(&key) && seen.insert(key)
-        })
-        .collect();
-    let frames = store.known_frames(satellite, &new.iter().collect::<Vec<_>>()).await?;
-    let delivered = new.into_iter().zip(frames).map(|(reception, known)| Delivered {
-        satellite: satellite.clone(),
-        reception: Arc::new(reception),
-        known,
-    });
-    Ok(delivered.collect())
 }

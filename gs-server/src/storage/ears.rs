@@ -8,13 +8,15 @@ use mission::snapshot::RecentFrame;
 use mission::{FrameId, SatelliteId, UtcUs};
 
 use super::convert::{int, narrow};
-use super::db::{Builder, Connection, DbRow, On, Reading, sql};
+use super::db::{
+    Builder, Connection, DbRow, On, Pool, Reading, Value, fitting, grouped, insert_rows, padded, sql,
+};
 use super::row::{Row as _, row, select};
 use super::rows::FrameRow;
 use super::{During, Page, Store, StoreError};
 
-/// Rows in one statement: below the limit on parameters of either database (32,766).
-const ROWS: usize = 250;
+/// Frames or checksums in one statement.
+const MANY: usize = 4_096;
 /// Frames with one checksum that are looked at; whoever makes more of them up meets no more.
 const SAME_CHECKSUM: i64 = 4_096;
 /// Frames that a restart remembers.
@@ -140,44 +142,6 @@ impl OutsideRow {
             taken_at_us: record.taken_at.0,
         })
     }
-
-    fn bind_to(self, statement: &mut Builder) {
-        let crc = self.crc();
-        statement.push_bind(self.satellite);
-        statement.push(", ").push_bind(self.station);
-        statement.push(", ").push_bind(self.frame);
-        statement.push(", ").push_bind(self.kind);
-        statement.push(", ").push_bind(self.source);
-        statement.push(", ").push_bind(self.source_id);
-        statement.push(", ").push_bind(self.receiver);
-        statement.push(", ").push_bind(self.receiver_name);
-        statement.push(", ").push_bind(self.latitude_deg);
-        statement.push(", ").push_bind(self.longitude_deg);
-        statement.push(", ").push_bind(self.altitude_m);
-        statement.push(", ").push_bind(self.received_at_us);
-        statement.push(", ").push_bind(self.time_basis);
-        statement.push(", ").push_bind(self.time_error_us);
-        statement.push(", ").push_bind(self.frequency_hz);
-        statement.push(", ").push_bind(self.frequency_offset_hz);
-        statement.push(", ").push_bind(self.doppler_hz);
-        statement.push(", ").push_bind(self.frequency_error_hz);
-        statement.push(", ").push_bind(self.spreading_factor);
-        statement.push(", ").push_bind(self.bandwidth_hz);
-        statement.push(", ").push_bind(self.coding_rate);
-        statement.push(", ").push_bind(self.rssi_dbm);
-        statement.push(", ").push_bind(self.snr_db);
-        statement.push(", ").push_bind(self.radio_crc);
-        statement.push(", ").push_bind(self.noisy);
-        statement.push(", ").push_bind(self.label);
-        statement.push(", ").push_bind(self.norad);
-        statement.push(", ").push_bind(self.trim_bytes);
-        statement.push(", ").push_bind(self.trim_bits);
-        statement.push(", ").push_bind(self.repaired_bit);
-        statement.push(", ").push_bind(self.doubts);
-        statement.push(", ").push_bind(self.original);
-        statement.push(", ").push_bind(self.taken_at_us);
-        statement.push(", ").push_bind(crc);
-    }
 }
 
 /// Frames that are new, and reports; both in few statements.
@@ -186,42 +150,11 @@ pub(super) async fn insert(
     frames: &[&FrameRecord],
     reports: &[&OutsideRecord],
 ) -> Result<(), StoreError> {
-    for frames in frames.chunks(ROWS) {
-        let mut statement = Builder::new(
-            "insert into frames (id, satellite, station, link, bytes, form, packet_type, tag, nested, heard_at_us, crc)
-             values ",
-        );
-        for (at, frame) in frames.iter().enumerate() {
-            let row = FrameRow::of(frame)?;
-            statement.push(if at == 0 { "(" } else { ", (" }).push_bind(row.id);
-            statement.push(", ").push_bind(&row.satellite);
-            statement.push(", ").push_bind(&row.station);
-            statement.push(", ").push_bind(&row.link);
-            statement.push(", ").push_bind(&row.bytes);
-            statement.push(", ").push_bind(&row.form);
-            statement.push(", ").push_bind(row.packet_type);
-            statement.push(", ").push_bind(row.tag);
-            statement.push(", ").push_bind(row.nested);
-            statement.push(", ").push_bind(row.heard_at_us);
-            statement.push(", ").push_bind(row.crc()).push(")");
-        }
-        statement.build().execute(&mut *connection).await?;
-    }
-    for reports in reports.chunks(ROWS) {
-        let mut statement = Builder::new(
-            "insert into outside_receptions (satellite, station, frame, kind, source, source_id, receiver, receiver_name, latitude_deg, longitude_deg, altitude_m,
-                received_at_us, time_basis, time_error_us, frequency_hz, frequency_offset_hz, doppler_hz, frequency_error_hz, spreading_factor, bandwidth_hz,
-                coding_rate, rssi_dbm, snr_db, radio_crc, noisy, label, norad, trim_bytes, trim_bits, repaired_bit, doubts, original, taken_at_us, crc) values ",
-        );
-        for (at, report) in reports.iter().enumerate() {
-            statement.push(if at == 0 { "(" } else { ", (" });
-            OutsideRow::of(report)?.bind_to(&mut statement);
-            statement.push(")");
-        }
-        statement.push(" on conflict (source, source_id, receiver) do nothing");
-        statement.build().execute(&mut *connection).await?;
-    }
-    Ok(())
+    let frames = frames.iter().map(|frame| FrameRow::of(frame)).collect::<Result<_, _>>()?;
+    insert_rows::<FrameRow>(connection, frames, "").await?;
+    let reports = reports.iter().map(|report| OutsideRow::of(report)).collect::<Result<_, _>>()?;
+    insert_rows::<OutsideRow>(connection, reports, " on conflict (source, source_id, receiver) do nothing")
+        .await
 }
 
 /// Which reports of others.
@@ -245,31 +178,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
     pub async fn outside(&self, query: &OutsideQuery) -> Result<Vec<(i64, OutsideRow)>, StoreError> {
-        let mut statement = Builder::new(format!("{} where 1 = 1", numbered()));
-        for (column, value) in
-            [("satellite", &query.satellite), ("source", &query.source), ("kind", &query.kind)]
-        {
-            if let Some(value) = value {
-                statement.push(format!(" and {column} = ")).push_bind(value.as_str());
-            }
-        }
-        if let Some(start_us) = query.during.start_us {
-            statement.push(" and received_at_us >= ").push_bind(start_us);
-        }
-        if let Some(stop_us) = query.during.stop_us {
-            statement.push(" and received_at_us < ").push_bind(stop_us);
-        }
-        if let Some(after) = query.page.after {
-            statement.push(" and id > ").push_bind(after);
-        }
-        if let Some(before) = query.page.before {
-            statement.push(" and id < ").push_bind(before);
-        }
-        let forward = query.page.after.is_some();
-        statement.push(if forward { " order by id limit " } else { " order by id desc limit " });
-        statement.push_bind(query.page.rows());
-        let rows = statement.build().fetch_all(&self.0.readers).await?;
-        rows.iter().map(read).collect()
+        outside(&self.0.readers, query).await
     }
 
     /// Who else heard these frames.
@@ -278,7 +187,7 @@ impl Store {
     /// [`StoreError`] when the database cannot be read.
     pub async fn outside_of(&self, frames: &[i64]) -> Result<HashMap<i64, Vec<OutsideRow>>, StoreError> {
         let mut heard: HashMap<i64, Vec<OutsideRow>> = HashMap::new();
-        for frames in frames.chunks(ROWS) {
+        for frames in frames.chunks(MANY) {
             let mut statement = Builder::new(format!("{} where frame in (", numbered()));
             for (at, frame) in frames.iter().enumerate() {
                 statement.push(if at == 0 { "" } else { ", " }).push_bind(*frame);
@@ -303,20 +212,19 @@ impl Store {
         reports: &[&Reception],
     ) -> Result<HashSet<(Ear, String, String)>, StoreError> {
         let mut known = HashSet::new();
-        for reports in reports.chunks(4 * ROWS) {
-            let mut statement = Builder::new(
-                "select source, source_id, receiver from outside_receptions where (source, source_id, receiver) in (values ",
-            );
-            for (at, report) in reports.iter().enumerate() {
-                statement.push(if at == 0 { "(" } else { ", (" }).push_bind(report.ear.name());
-                statement.push(", ").push_bind(report.source_id.as_str());
-                statement.push(", ").push_bind(report.receiver_id()).push(")");
+        let mut rest = reports;
+        while !rest.is_empty() {
+            let (reports, later) = rest.split_at(fitting(rest.len(), 3));
+            rest = later;
+            let mut values = Vec::with_capacity(reports.len() * 3);
+            for report in reports {
+                let key = [report.ear.name(), &report.source_id, report.receiver_id()];
+                values.extend(key.map(Value::from));
             }
-            statement.push(")");
-            if reports.is_empty() {
-                continue;
-            }
-            for row in &statement.build().fetch_all(&self.0.readers).await? {
+            let head = "select source, source_id, receiver from outside_receptions
+                where (source, source_id, receiver) in (values ";
+            let statement = grouped(head, (reports.len(), 3), ")", values);
+            for row in &statement.fetch_all(&self.0.readers).await? {
                 let source: String = row.try_get("source")?;
                 if let Some(ear) = Ear::from_name(&source) {
                     known.insert((ear, row.try_get("source_id")?, row.try_get("receiver")?));
@@ -336,15 +244,20 @@ impl Store {
         reports: &[&Reception],
     ) -> Result<Vec<Option<Known>>, StoreError> {
         let mut found = Vec::with_capacity(reports.len());
-        for reports in reports.chunks(4 * ROWS) {
+        for reports in reports.chunks(MANY) {
             let candidates = self.candidates(satellite, reports).await?;
             found.extend(reports.iter().map(|report| {
                 let bytes = report.frame()?;
                 let mine = (report.received_at, report.is_dated());
                 let same = candidates.get(bytes)?.iter();
                 let same = same.filter(|(_, at, dated)| is_same_frame(bytes, (*at, *dated), mine));
-                let nearest = same.min_by_key(|(_, at, _)| at.0.abs_diff(mine.0.0))?;
-                Some(Known { frame: FrameId(u64::try_from(nearest.0).ok()?), dated: nearest.2 })
+                // Of two as near the older, as the engine has it.
+                let nearest = same.min_by_key(|(id, at, _)| (at.0.abs_diff(mine.0.0), *id))?;
+                Some(Known {
+                    frame: FrameId(u64::try_from(nearest.0).ok()?),
+                    at: nearest.1,
+                    dated: nearest.2,
+                })
             }));
         }
         Ok(found)
@@ -362,16 +275,17 @@ impl Store {
         if checksums.is_empty() {
             return Ok(candidates);
         }
-        let mut statement = Builder::new("select id, bytes, heard_at_us, case when station = ");
-        statement.push_bind(ELSEWHERE).push(" and link = ").push_bind(UNDATED);
-        statement.push(" then cast(0 as bigint) else cast(1 as bigint) end as dated from frames where substr(bytes, 9, 4) in (");
-        for (at, checksum) in checksums.iter().enumerate() {
-            statement.push(if at == 0 { "" } else { ", " }).push_bind(*checksum);
-        }
-        statement.push(") and satellite = ").push_bind(satellite.as_str());
-        statement.push(" and nested = 0 order by id desc limit ");
-        statement.push_bind(SAME_CHECKSUM.max(checksums.len() as i64 * 4));
-        for row in &statement.build().fetch_all(&self.0.readers).await? {
+        let mut values: Vec<Value> = vec![ELSEWHERE.into(), UNDATED.into(), satellite.as_str().into()];
+        values.extend(checksums.iter().copied().map(Value::from));
+        // The last one again, up to a number that other statements have as well.
+        let columns = padded(checksums.len());
+        values.resize(3 + columns, checksums.iter().copied().last().map_or(Value::Bytes(None), Value::from));
+        let head = "select id, bytes, heard_at_us,
+              cast(case when station = ? and link = ? then 0 else 1 end as bigint) as dated
+            from frames where satellite = ? and nested = 0 and substr(bytes, 9, 4) in ";
+        values.push(SAME_CHECKSUM.max(checksums.len() as i64 * 4).into());
+        let statement = grouped(head, (1, columns), " order by id desc limit ?", values);
+        for row in &statement.fetch_all(&self.0.readers).await? {
             let id = row.try_get("id")?;
             let mut at = UtcUs(row.try_get("heard_at_us")?);
             let mut dated = row.try_get::<i64>("dated")? == 1;
@@ -382,6 +296,37 @@ impl Store {
         }
         Ok(candidates)
     }
+}
+
+/// Reports with their numbers.
+pub(super) async fn outside(
+    readers: &Pool,
+    query: &OutsideQuery,
+) -> Result<Vec<(i64, OutsideRow)>, StoreError> {
+    let mut statement = Builder::new(format!("{} where 1 = 1", numbered()));
+    for (column, value) in [("satellite", &query.satellite), ("source", &query.source), ("kind", &query.kind)]
+    {
+        if let Some(value) = value {
+            statement.push(format!(" and {column} = ")).push_bind(value.as_str());
+        }
+    }
+    if let Some(start_us) = query.during.start_us {
+        statement.push(" and received_at_us >= ").push_bind(start_us);
+    }
+    if let Some(stop_us) = query.during.stop_us {
+        statement.push(" and received_at_us < ").push_bind(stop_us);
+    }
+    if let Some(after) = query.page.after {
+        statement.push(" and id > ").push_bind(after);
+    }
+    if let Some(before) = query.page.before {
+        statement.push(" and id < ").push_bind(before);
+    }
+    let forward = query.page.after.is_some();
+    statement.push(if forward { " order by id limit " } else { " order by id desc limit " });
+    statement.push_bind(query.page.rows());
+    let rows = statement.build().fetch_all(readers).await?;
+    rows.iter().map(read).collect()
 }
 
 /// When a frame was heard that came without a time, as somebody has told since.

@@ -24,6 +24,7 @@ mod convert_sky;
 mod db;
 mod ears;
 mod error;
+mod export;
 mod forwards;
 mod inspect;
 mod lite;
@@ -64,6 +65,7 @@ pub use beside::Archive;
 pub use ears::{OutsideQuery, OutsideRow};
 pub use error::StoreError;
 pub(crate) use error::utc;
+pub use export::{Export, Exported};
 pub use forwards::{
     ForwardCounts, ForwardQuery, ForwardRow, ForwardState, ForwardSubject, ForwardTargetRow, ForwardWish,
 };
@@ -274,6 +276,15 @@ impl Store {
     /// [`StoreError`] when the database does not take it.
     pub async fn set_max_page_count(&self, pages: u32) -> Result<(), StoreError> {
         self.0.writer.lock().await.set_max_page_count(pages).await
+    }
+
+    /// Gives the writer more memory and a longer log, for an import beside which nothing else is done. As durable as
+    /// before. A database elsewhere has memory of its own.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database does not take it.
+    pub async fn make_room(&self) -> Result<(), StoreError> {
+        self.0.writer.lock().await.make_room().await
     }
 
     /// The witness of each key.

@@ -197,7 +197,7 @@ async fn remake(
     report.added += wanted.len() as u64 - changed;
     report.changed += changed;
     let rows: Vec<TelemetryRow> = wanted.into_values().collect();
-    transaction.insert_telemetry(&rows).await
+    transaction.insert_telemetry(rows).await
 }
 
 /// When the values of a frame were heard. A frame that came without a time has values once somebody reports it with one.

@@ -9,7 +9,7 @@ use std::fmt;
 use sqlx::AssertSqlSafe;
 
 use super::StoreError;
-use super::db::{DbRow, Query};
+use super::db::{DbRow, Query, Value};
 
 /// Collects the values of one row.
 pub(super) struct Digest(Vec<u8>);
@@ -92,6 +92,10 @@ pub(super) fn wrong_row(table: &str, first: &dyn fmt::Debug) -> StoreError {
 pub(super) trait Row: Sized + Send {
     /// `insert into …`, all columns.
     const INSERT: &'static str;
+    /// `insert into … values `, to be followed by groups of values.
+    const HEAD: &'static str;
+    /// How many columns, with the checksum.
+    const COLUMNS: usize;
     /// `select … from …`, to be followed by a condition.
     const SELECT: &'static str;
     /// Everything but the first column, taken from the row that was to be inserted.
@@ -100,6 +104,8 @@ pub(super) trait Row: Sized + Send {
     fn crc(&self) -> i64;
     /// All columns and the checksum, in the order of [`Self::INSERT`].
     fn bind(&self, query: Query) -> Query;
+    /// The same, handed over.
+    fn give(self, out: &mut Vec<Value>);
     /// The row, when its checksum is right.
     fn read(row: &DbRow) -> Result<Self, StoreError>;
 }
@@ -135,6 +141,10 @@ macro_rules! row {
                 "insert into ", $table, " (", stringify!($first), $(", ", stringify!($field),)* ", crc) values (?",
                 $(row!(@ ", ?" $field),)* ", ?)"
             );
+            const HEAD: &'static str = concat!(
+                "insert into ", $table, " (", stringify!($first), $(", ", stringify!($field),)* ", crc) values "
+            );
+            const COLUMNS: usize = 2 $(+ row!(@ 1 $field))*;
             const SELECT: &'static str = concat!(
                 "select ", stringify!($first), $(", ", stringify!($field),)* ", crc from ", $table
             );
@@ -152,6 +162,13 @@ macro_rules! row {
 
             fn bind(&self, query: crate::storage::db::Query) -> crate::storage::db::Query {
                 query.bind(&self.$first)$(.bind(&self.$field))*.bind(self.crc())
+            }
+
+            fn give(self, out: &mut Vec<crate::storage::db::Value>) {
+                let crc = crate::storage::row::Row::crc(&self);
+                out.push(self.$first.into());
+                $(out.push(self.$field.into());)*
+                out.push(crc.into());
             }
 
             fn read(row: &crate::storage::db::DbRow) -> Result<Self, crate::storage::StoreError> {

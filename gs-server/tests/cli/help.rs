@@ -120,6 +120,7 @@ fn every_verb_tells_what_it_does() {
             "gs-server-refuse",
             "gs-server-ears",
             "gs-server-import",
+            "gs-server-export",
             "gs-server-redecode",
         ]
     );

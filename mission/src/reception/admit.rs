@@ -123,6 +123,11 @@ fn plain(text: &str, most: usize, doubts: &mut Doubts) -> Option<String> {
         c.is_control()
             || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
     };
+    // As nearly all names are.
+    let trimmed = text.trim();
+    if trimmed.len() <= most && trimmed.bytes().all(|byte| matches!(byte, 0x20..=0x7E)) {
+        return (!trimmed.is_empty()).then(|| trimmed.to_owned());
+    }
     let mut kept: String = text.trim().chars().filter(|c| !unseen(*c)).take(most).collect();
     if kept.len() != text.trim().len() {
         doubts.add(Doubt::Name);

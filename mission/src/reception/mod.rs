@@ -280,6 +280,8 @@ pub struct Delivered {
 pub struct Known {
     /// Which.
     pub frame: FrameId,
+    /// When it was heard, as well as that is known.
+    pub at: UtcUs,
     /// Somebody heard it at a time that is known.
     pub dated: bool,
 }

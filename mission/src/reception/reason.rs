@@ -30,11 +30,14 @@ pub enum Refusal {
     /// Another satellite's, or noise.
     #[error("it is none of our satellite's: no magic where one may stand")]
     Foreign,
+    /// More came at once than can be stored. Whoever sent it may send it again.
+    #[error("there was no room for it: more came at once than can be stored")]
+    NoRoom,
 }
 
 impl Refusal {
     /// All.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::TooLong,
         Self::TooDeep,
         Self::Malformed,
@@ -44,6 +47,7 @@ impl Refusal {
         Self::PacketTooLong,
         Self::TestPacket,
         Self::Foreign,
+        Self::NoRoom,
     ];
 
     /// The word under which it is counted.
@@ -58,6 +62,7 @@ impl Refusal {
             Self::PacketTooLong => "packet-too-long",
             Self::TestPacket => "test-packet",
             Self::Foreign => "foreign",
+            Self::NoRoom => "no-room",
         }
     }
 }

@@ -35,6 +35,8 @@ pub(super) struct Heard {
     pub(super) has_values: bool,
     /// Somebody else's report of it came first, without a time: its values are filed as the frame is.
     pub(super) was_undated: bool,
+    /// One of thousands: what it does not change is not told of it alone.
+    pub(super) one_of_many: bool,
 }
 
 /// How a frame came in.
@@ -207,6 +209,7 @@ impl Station {
             repeat: false,
             has_values: false,
             was_undated: false,
+            one_of_many: false,
         };
         self.packet(&heard, &packet);
     }
@@ -240,6 +243,7 @@ impl Station {
             repeat: known.is_some_and(|(_, others_first, _)| !others_first) && !how.promoted,
             has_values: known.is_some_and(|(_, others_first, has_values)| others_first && has_values),
             was_undated: known.is_some_and(|(_, others_first, has_values)| others_first && !has_values),
+            one_of_many: false,
         };
         let (record, reception) = rows(id, route.clone(), frame, &how, received.utc);
         if how.promoted && known.is_some() {
@@ -308,6 +312,15 @@ impl Station {
             }
         }
         self.packet(heard, &packet);
+    }
+
+    /// An event about a frame that was heard and is kept as its bytes alone.
+    pub(super) fn kept_raw(&mut self, heard: &Heard, kind: EventKind, level: Level, message: String) {
+        if heard.one_of_many {
+            self.kept_raw += 1;
+        } else {
+            self.heard_event(heard, kind, level, message);
+        }
     }
 
     /// An event about a frame that was heard.

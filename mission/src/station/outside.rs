@@ -5,9 +5,9 @@
 
 use protocol::{DownFrame, Downlink};
 
-use super::Station;
 use super::intake::Heard;
-use super::recent::Recent;
+use super::recent::{Recent, nearness};
+use super::{About, Station};
 use crate::clock::Now;
 use crate::id::{FrameId, LinkId, SatelliteId, StationId};
 use crate::level::Level;
@@ -39,8 +39,13 @@ impl Station {
             return;
         }
         let (mut taken, mut told) = (Taken::default(), 0);
+        self.kept_raw = 0;
         for delivered in receptions {
             self.take_report(now, delivered, &mut taken, &mut told);
+        }
+        if self.kept_raw > 0 {
+            let message = format!("{} more frames of images that others heard were kept raw", self.kept_raw);
+            self.event(now.utc, EventKind::FrameHeard, Level::Normal, About::default(), message);
         }
         self.journal.when_durable(Effect::Taken { delivery, result: Ok(taken) });
     }
@@ -55,18 +60,27 @@ impl Station {
             return;
         };
         let at = (reception.received_at, reception.is_dated());
-        let remembered = self.recent.find(s, frame.bytes(), at).map(|recent| {
-            let known = Known { frame: recent.id, dated: recent.dated };
-            if at.1 && !recent.dated {
-                (recent.at, recent.dated) = at;
-            }
-            known
+        let remembered = self.recent.find(s, frame.bytes(), at).map(|recent| Known {
+            frame: recent.id,
+            at: recent.at,
+            dated: recent.dated,
         });
-        match remembered.or(delivered.known) {
+        // Of a frame that is remembered memory knows more than the archive said when it was asked, a batch ago.
+        let near = |known: &Known| nearness(known.at, at.0, known.frame);
+        let archived = delivered.known.filter(|known| !self.recent.holds(s, frame.bytes(), known.frame));
+        match remembered.into_iter().chain(archived).min_by_key(near) {
             Some(known) => {
                 taken.merged += 1;
                 self.push_outside(now, delivered, Some(known.frame));
                 if at.1 && !known.dated {
+                    self.recent.date(Recent {
+                        id: known.frame,
+                        satellite: s,
+                        at: at.0,
+                        bytes: frame.bytes().into(),
+                        elsewhere: true,
+                        dated: true,
+                    });
                     self.derive(now, s, delivered, (known.frame, false), &frame, told);
                 }
             }
@@ -124,7 +138,7 @@ impl Station {
             if is_new { route(&delivered.satellite, reception) } else { undated(&delivered.satellite) };
         let Some(route) = route else { return };
         let Some(link) = self.links.iter().position(|link| link.satellite == s) else { return };
-        let heard = Heard {
+        let mut heard = Heard {
             id,
             route,
             link,
@@ -136,12 +150,15 @@ impl Station {
             repeat: false,
             has_values: false,
             was_undated: false,
+            one_of_many: true,
         };
         let is_fresh = reception.is_dated() && now.utc.0.abs_diff(heard.at.utc.0) <= FRESH_US;
         let packet = frame.packet();
         let is_of_image = matches!(packet, Ok(Downlink::ImageInfo(_) | Downlink::ImageChunk(_)));
-        *told += u32::from(is_fresh);
-        if (is_fresh && *told <= TOLD) || is_of_image {
+        let is_worth_it = is_fresh || is_of_image;
+        *told += u32::from(is_worth_it);
+        heard.one_of_many = *told > TOLD;
+        if is_worth_it && !heard.one_of_many {
             let what = packet.as_ref().map_or("frame", Downlink::name);
             let (bytes, ear) = (frame.bytes().len(), reception.ear.name());
             let who = reception.receiver.name.as_deref().or(reception.receiver.id.as_deref());
@@ -154,7 +171,7 @@ impl Station {
             if matches!(packet, Downlink::ImageChunk(_)) {
                 let message =
                     "a chunk whose time is not known may belong to another image: kept raw".to_owned();
-                self.heard_event(&heard, EventKind::ChunkReceived, Level::Watch, message);
+                self.kept_raw(&heard, EventKind::ChunkReceived, Level::Watch, message);
             }
             return;
         }

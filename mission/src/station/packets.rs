@@ -231,7 +231,7 @@ impl Station {
         if !is_usable(info) {
             let message =
                 format!("ImageInfo is not used: {} chunks do not fit {} bytes", info.chunks, info.size_bytes);
-            self.heard_event(heard, EventKind::ImageDeclared, Level::Distress, message);
+            self.kept_raw(heard, EventKind::ImageDeclared, Level::Distress, message);
             if answers.is_some() {
                 self.download_without_image(
                     heard.at,
@@ -251,7 +251,7 @@ impl Station {
             if differs {
                 let message =
                     "ImageInfo tells of another image, but not from our radio now: kept raw".to_owned();
-                self.heard_event(heard, EventKind::ImageDeclared, Level::Watch, message);
+                self.kept_raw(heard, EventKind::ImageDeclared, Level::Watch, message);
             }
             return;
         }
@@ -291,13 +291,13 @@ impl Station {
         let index = chunk.index.0;
         let Some(image) = &mut self.satellites[s].image else {
             let message = format!("chunk {index} of an image that nobody has declared: kept raw");
-            self.heard_event(heard, EventKind::ChunkReceived, Level::Watch, message);
+            self.kept_raw(heard, EventKind::ChunkReceived, Level::Watch, message);
             return;
         };
         if !heard.live && heard.at.utc < image.record.declared_at {
             let message =
                 format!("chunk {index} was heard before image {} was declared: kept raw", image.record.id);
-            self.heard_event(heard, EventKind::ChunkReceived, Level::Watch, message);
+            self.kept_raw(heard, EventKind::ChunkReceived, Level::Watch, message);
             return;
         }
         let was_complete = image.is_complete();
@@ -310,7 +310,7 @@ impl Station {
             Fit::Outside => {
                 let chunks = image.record.chunks;
                 let message = format!("chunk {index} lies outside image {id} of {chunks} chunks: kept raw");
-                self.heard_event(heard, EventKind::ChunkReceived, Level::Watch, message);
+                self.kept_raw(heard, EventKind::ChunkReceived, Level::Watch, message);
                 return;
             }
         };

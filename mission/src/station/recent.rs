@@ -54,6 +54,12 @@ fn mark(satellite: usize, bytes: &[u8]) -> Mark {
     (satellite, crc)
 }
 
+/// Of several frames with the same bytes the one that is nearest in time counts, of two as near the older: whoever looks,
+/// in memory or in the archive, finds the same.
+pub(super) const fn nearness(frame: UtcUs, at: UtcUs, id: FrameId) -> (u64, u64) {
+    (frame.0.abs_diff(at.0), id.0)
+}
+
 /// The frames that are remembered.
 #[derive(Debug, Default)]
 pub(super) struct Recents {
@@ -85,8 +91,10 @@ impl Ring {
 
     fn find(&mut self, satellite: usize, bytes: &[u8], at: (UtcUs, bool)) -> Option<&mut Recent> {
         let same = self.by_mark.get_mut(&mark(satellite, bytes))?;
-        same.iter_mut()
-            .find(|recent| *recent.bytes == *bytes && is_same_frame(bytes, (recent.at, recent.dated), at))
+        let same = same
+            .iter_mut()
+            .filter(|recent| *recent.bytes == *bytes && is_same_frame(bytes, (recent.at, recent.dated), at));
+        same.min_by_key(|recent| nearness(recent.at, at.0, recent.id))
     }
 }
 
@@ -99,9 +107,30 @@ impl Recents {
         }
     }
 
+    /// Whether this frame with these bytes is remembered, whatever its time.
+    pub(super) fn holds(&self, satellite: usize, bytes: &[u8], id: FrameId) -> bool {
+        let mark = mark(satellite, bytes);
+        let same = [&self.own, &self.others].into_iter().filter_map(|ring| ring.by_mark.get(&mark));
+        same.flatten().any(|recent| recent.id == id)
+    }
+
+    /// Somebody has told when a frame was heard that came without a time.
+    pub(super) fn date(&mut self, told: Recent) {
+        let Self { own, others } = self;
+        let same = [own, others].into_iter().find_map(|ring| {
+            let same = ring.by_mark.get_mut(&told.mark())?;
+            same.iter_mut().find(|recent| recent.id == told.id)
+        });
+        match same {
+            Some(recent) => (recent.at, recent.dated) = (told.at, true),
+            None => self.remember(told),
+        }
+    }
+
     /// The frame with these bytes at this time (and whether that is known).
     pub(super) fn find(&mut self, satellite: usize, bytes: &[u8], at: (UtcUs, bool)) -> Option<&mut Recent> {
         let Self { own, others } = self;
-        own.find(satellite, bytes, at).or_else(|| others.find(satellite, bytes, at))
+        let found = [own.find(satellite, bytes, at), others.find(satellite, bytes, at)];
+        found.into_iter().flatten().min_by_key(|recent| nearness(recent.at, at.0, recent.id))
     }
 }

@@ -78,6 +78,7 @@ pub(super) fn station(
         ids: snapshot.last_ids,
         last_tx: 0,
         recent,
+        kept_raw: 0,
         synchronised: false,
         vouched: false,
         stopping: false,

@@ -118,7 +118,7 @@ fn a_report_without_a_time_joins_by_bytes_that_are_unique_and_gives_no_values() 
 #[test]
 fn what_the_archive_knows_is_believed_of_it() {
     let mut world = World::in_contact();
-    let known = Known { frame: FrameId(1), dated: true };
+    let known = Known { frame: FrameId(1), at: world.now.utc, dated: true };
     let delivered = Delivered {
         known: Some(known),
         ..report(&world, "k", &heartbeat_frame(0, 1, 1), Some(UtcUs(1_600_000_000_000_000)))

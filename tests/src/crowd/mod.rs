@@ -207,8 +207,16 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
 
 /// The most memory that a process had at once (`VmHWM` of proc(5)).
 fn peak_memory_mib(pid: u32) -> f64 {
+    peak_kib(pid) as f64 / 1024.0
+}
+
+/// The same in KiB.
+///
+/// # Panics
+/// When the process has ended.
+#[must_use]
+pub fn peak_kib(pid: u32) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).expect("procfs");
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("the peak of memory");
-    let kib: f64 = line.trim().trim_end_matches(" kB").trim().parse().expect("a number");
-    kib / 1024.0
+    line.trim().trim_end_matches(" kB").trim().parse().expect("a number")
 }

@@ -91,7 +91,7 @@ fn running(config: &Config) -> Result<Remote, Failure> {
 
 fn remote_failure(error: RemoteError) -> Failure {
     match error {
-        RemoteError::Refused(_) | RemoteError::Token(_) => Failure::refused(error),
+        RemoteError::Refused(_) | RemoteError::Busy(_) | RemoteError::Token(_) => Failure::refused(error),
         RemoteError::NoPort => Failure::usage(error),
         _ => Failure::failed(error),
     }

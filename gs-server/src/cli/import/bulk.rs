@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
+use std::time::Duration;
 
 use api::{ImportItem, ImportReport, ImportRequest};
 use indicatif::ProgressBar;
@@ -12,22 +13,27 @@ use mission::reception::Ear;
 use rayon::prelude::*;
 use serde::Serialize;
 use tokio::sync::mpsc;
+use tokio_util::sync::CancellationToken;
 
 use super::super::Failure;
 use crate::elements::{Remote, RemoteError};
 use crate::ingest::formats::{Context, Format, Item, Items, read};
-use crate::ingest::{Ears, EarsError, Outcome, TOGETHER};
+use crate::ingest::{Delivery, Ears, EarsError, Outcome, TOGETHER_ALONE};
 
 /// Items that are read together: enough for all cores, little enough to hold.
-const AT_ONCE: usize = 4 * TOGETHER;
-/// Bytes of items in one request: the API takes 64 KiB with everything escaped.
-const REQUEST_MAX: usize = 24 << 10;
+const AT_ONCE: usize = TOGETHER_ALONE;
+/// Bytes of items in one request: the API takes 512 KiB with everything escaped.
+const REQUEST_MAX: usize = 240 << 10;
+/// Items in one request.
+const ITEMS_MAX: usize = 1_000;
+/// Between two tries.
+const AGAIN: Duration = Duration::from_secs(1);
 /// How often a busy archive is asked again, with a second between.
 const PATIENCE: u32 = 120;
 
 /// Where the items go.
 pub(super) enum Taker {
-    /// Into the archive in this process.
+    /// Into the archive in this process, where nothing else is done meanwhile.
     Here(Ears, SatelliteId),
     /// To the server that runs.
     There(Box<Remote>, ImportRequest),
@@ -54,6 +60,11 @@ impl Sum {
         for (reason, count) in &other.reasons {
             *self.reasons.entry(reason.clone()).or_default() += count;
         }
+    }
+
+    /// Reports that were read, whatever became of them.
+    pub(super) const fn packets(&self) -> u64 {
+        self.frames + self.merged + self.without_frame + self.repeated + self.refused
     }
 
     fn took(&mut self, outcome: &Outcome) {
@@ -93,31 +104,52 @@ impl Broken {
 
 pub(super) fn refused(error: RemoteError) -> Failure {
     match error {
-        RemoteError::Refused(_) | RemoteError::Token(_) => Failure::refused(error),
+        RemoteError::Refused(_) | RemoteError::Busy(_) | RemoteError::Token(_) => Failure::refused(error),
         RemoteError::NoPort => Failure::usage(error),
         _ => Failure::failed(error),
     }
 }
 
-/// Imports what a reader has.
+/// Imports what a reader has, until its end or until `stop`.
 pub(super) async fn import(
     format: Format,
     reader: impl Read + Send + 'static,
     context: &Context,
     taker: &Taker,
-    bar: &ProgressBar,
+    (bar, stop): (&ProgressBar, &CancellationToken),
 ) -> Result<Sum, Broken> {
     // Two batches ahead: what is read waits for what is stored.
     let (sender, mut batches) = mpsc::channel(2);
     let is_here = matches!(taker, Taker::Here(..));
     let context = context.clone();
     let cutter = tokio::task::spawn_blocking(move || cut(format, reader, is_here, &context, &sender));
+    let mut delivery = match taker {
+        Taker::Here(ears, satellite) => {
+            Some(ears.deliver(satellite, Ear::File, TOGETHER_ALONE, PATIENCE).await.map_err(Broken::Here)?)
+        }
+        Taker::There(..) => None,
+    };
     let mut sum = Sum::default();
     while let Some(batch) = batches.recv().await {
-        take(taker, batch.map_err(Broken::File)?, &mut sum).await?;
-        bar.set_message(format!("{} new frames, {} receptions", sum.frames, sum.merged));
+        match (batch.map_err(Broken::File)?, &mut delivery, taker) {
+            (Batch::Read(found), Some(delivery), _) => here(delivery, found, &mut sum).await?,
+            (Batch::Items(items), _, Taker::There(remote, request)) => {
+                there(remote, request, items, (&mut sum, stop)).await?;
+            }
+            _ => {}
+        }
+        let rate = sum.packets() as f64 / bar.elapsed().as_secs_f64().max(0.001);
+        bar.set_message(format!("{} packets, {rate:.0}/s, {} new frames", sum.packets(), sum.frames));
+        if stop.is_cancelled() {
+            break;
+        }
     }
+    // What cuts notices that nobody takes any more.
+    drop(batches);
     cutter.await.map_err(|error| Broken::File(std::io::Error::other(error)))?;
+    if let Some(delivery) = delivery {
+        sum.took(&delivery.end().await.map_err(Broken::Here)?);
+    }
     Ok(sum)
 }
 
@@ -154,36 +186,50 @@ fn cut(
     }
 }
 
-async fn take(taker: &Taker, batch: Batch, sum: &mut Sum) -> Result<(), Broken> {
-    match (taker, batch) {
-        (Taker::Here(ears, satellite), Batch::Read(found)) => {
-            for refused in found.iter().filter_map(|read| read.as_ref().err()) {
-                *sum.reasons.entry(refused.reason.to_string()).or_default() += 1;
-            }
-            let outcome = ears.take_patiently(satellite, Ear::File, found, PATIENCE).await;
-            sum.took(&outcome.map_err(Broken::Here)?);
-            Ok(())
-        }
-        (Taker::There(remote, request), Batch::Items(items)) => {
-            let mut part = ImportRequest { items: Vec::new(), ..request.clone() };
-            let mut bytes = 0;
-            for item in items {
-                let Some((length, item)) = wire(item, sum) else { continue };
-                if bytes + length > REQUEST_MAX && !part.items.is_empty() {
-                    send(remote, &mut part, sum).await?;
-                    bytes = 0;
-                }
-                bytes += length;
-                part.items.push(item);
-            }
-            if part.items.is_empty() { Ok(()) } else { send(remote, &mut part, sum).await }
-        }
-        _ => Ok(()),
+async fn here(
+    delivery: &mut Delivery,
+    found: Vec<crate::ingest::formats::Read>,
+    sum: &mut Sum,
+) -> Result<(), Broken> {
+    for refused in found.iter().filter_map(|read| read.as_ref().err()) {
+        *sum.reasons.entry(refused.reason.to_string()).or_default() += 1;
     }
+    sum.took(&delivery.push(found).await.map_err(Broken::Here)?);
+    Ok(())
+}
+
+async fn there(
+    remote: &Remote,
+    request: &ImportRequest,
+    items: Vec<Item>,
+    (sum, stop): (&mut Sum, &CancellationToken),
+) -> Result<(), Broken> {
+    let mut part = ImportRequest { items: Vec::new(), ..request.clone() };
+    let mut bytes = 0;
+    for item in items {
+        let Some((length, item)) = wire(item, sum) else { continue };
+        if (bytes + length > REQUEST_MAX || part.items.len() >= ITEMS_MAX) && !part.items.is_empty() {
+            send(remote, &mut part, sum).await?;
+            bytes = 0;
+            if stop.is_cancelled() {
+                return Ok(());
+            }
+        }
+        bytes += length;
+        part.items.push(item);
+    }
+    if part.items.is_empty() { Ok(()) } else { send(remote, &mut part, sum).await }
 }
 
 async fn send(remote: &Remote, part: &mut ImportRequest, sum: &mut Sum) -> Result<(), Broken> {
-    let report: ImportReport = remote.make("receptions", part).await.map_err(Broken::There)?;
+    let mut tries = PATIENCE;
+    let report: ImportReport = loop {
+        match remote.make("receptions", part).await {
+            Err(RemoteError::Busy(_)) if tries > 0 => tries -= 1,
+            report => break report.map_err(Broken::There)?,
+        }
+        crate::clock::wall_sleep(AGAIN).await;
+    };
     sum.took_there(&report);
     part.items.clear();
     Ok(())

@@ -9,11 +9,6 @@ use super::value::{Fields, stamp};
 
 /// The line of a reception.
 pub fn export(reception: &Reception) -> String {
-    let bytes = match &reception.content {
-        Content::Frame { bytes, .. } => Some(hex::encode(bytes)),
-        Content::Damaged { delivered, .. } => Some(hex::encode(delivered)),
-        Content::Detection => None,
-    };
     let Reception { receiver, signal, .. } = reception;
     json!({
         "pixelsat_reception": 1,
@@ -38,9 +33,64 @@ pub fn export(reception: &Reception) -> String {
         "noisy": reception.noisy,
         "label": reception.label,
         "norad": reception.norad,
-        "hex": bytes,
+        "hex": bytes(reception),
     })
     .to_string()
+}
+
+/// The names of the columns of [`csv`].
+pub const CSV_HEAD: &str = "received_at,time_basis,kind,source,source_id,receiver,receiver_name,latitude_deg,longitude_deg,\
+    altitude_m,frequency_hz,frequency_offset_hz,doppler_hz,frequency_error_hz,spreading_factor,bandwidth_hz,coding_rate,\
+    rssi_dbm,snr_db,radio_crc,noisy,label,norad,hex";
+
+/// The line of a reception in a table.
+pub fn csv(reception: &Reception) -> String {
+    let Reception { receiver, signal, .. } = reception;
+    let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+    let small = |value: Option<u8>| value.map(|value| value.to_string()).unwrap_or_default();
+    [
+        time(reception.received_at).unwrap_or_default(),
+        reception.time_basis.name().to_owned(),
+        reception.content.kind().to_owned(),
+        reception.ear.name().to_owned(),
+        cell(&reception.source_id),
+        cell(reception.receiver_id()),
+        cell(receiver.name.as_deref().unwrap_or_default()),
+        number(receiver.latitude_deg),
+        number(receiver.longitude_deg),
+        number(receiver.altitude_m),
+        number(signal.frequency_hz),
+        number(signal.frequency_offset_hz),
+        number(signal.doppler_hz),
+        number(signal.frequency_error_hz),
+        small(signal.spreading_factor),
+        number(signal.bandwidth_hz),
+        small(signal.coding_rate),
+        number(signal.rssi_dbm),
+        number(signal.snr_db),
+        reception.radio_crc.name().to_owned(),
+        reception.noisy.to_string(),
+        cell(reception.label.as_deref().unwrap_or_default()),
+        reception.norad.map(|norad| norad.to_string()).unwrap_or_default(),
+        bytes(reception).unwrap_or_default(),
+    ]
+    .join(",")
+}
+
+/// Text of a stranger as a cell: quoted where need be, and never a formula.
+fn cell(text: &str) -> String {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    let text = format!("{}{text}", if formula { "'" } else { "" });
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
+}
+
+/// The frame, or what is left of one.
+fn bytes(reception: &Reception) -> Option<String> {
+    match &reception.content {
+        Content::Frame { bytes, .. } => Some(hex::encode(bytes)),
+        Content::Damaged { delivered, .. } => Some(hex::encode(delivered)),
+        Content::Detection => None,
+    }
 }
 
 fn time(at: UtcUs) -> Option<String> {

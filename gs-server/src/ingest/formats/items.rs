@@ -77,7 +77,11 @@ impl<R: BufRead> Items<R> {
         match cut {
             CutBy::Json(cutter) => {
                 let mut take = |cut: Cut| found.push_back(item(cut.line, cut.prefix, cut.body));
-                piece.iter().for_each(|&byte| cutter.push(byte, &mut take));
+                let mut rest = piece;
+                while let Some((&byte, after)) = rest.split_first() {
+                    cutter.push(byte, &mut take);
+                    rest = &after[cutter.push_text(after)..];
+                }
                 if *ended {
                     cutter.end(&mut take);
                 }

@@ -7,6 +7,8 @@ use super::{Context, DEPTH_MAX, PACKET_MAX, export, satnogs, tinygs};
 
 /// Bytes of a line before its object that are kept: a topic.
 const PREFIX_MAX: usize = 256;
+/// Bytes of a string that are looked at.
+const WORD_MAX: usize = 16;
 /// Keys of an answer whose lists hold the items.
 const WRAPPERS: [&[u8]; 2] = [b"packets", b"results"];
 
@@ -105,6 +107,23 @@ impl Cutter {
         self.before = byte;
     }
 
+    /// Takes the bytes at the beginning of `rest` that are nothing but the inside of a string, all at once; how many.
+    pub(super) fn push_text(&mut self, rest: &[u8]) -> usize {
+        if !self.in_string || self.escaped {
+            return 0;
+        }
+        let ends = |byte: &u8| matches!(byte, b'"' | b'\\' | b'\n');
+        let count = rest.iter().position(ends).unwrap_or(rest.len());
+        let text = &rest[..count];
+        self.column += count as u64;
+        if let Some(item) = &mut self.item {
+            item.keep_all(text);
+        }
+        let room = WORD_MAX.saturating_sub(self.word.len());
+        self.word.extend_from_slice(&text[..count.min(room)]);
+        count
+    }
+
     /// The reader is at its end.
     pub(super) fn end(&mut self, take: &mut dyn FnMut(Cut)) {
         if self.item.is_some() {
@@ -163,7 +182,7 @@ impl Cutter {
             self.before = b'"';
             return;
         }
-        if self.word.len() < 16 {
+        if self.word.len() < WORD_MAX {
             self.word.push(byte);
         }
     }
@@ -217,6 +236,15 @@ impl Cutter {
 }
 
 impl Open {
+    fn keep_all(&mut self, bytes: &[u8]) {
+        if self.wrong.is_none() && self.held.len() + bytes.len() <= PACKET_MAX {
+            self.held.extend_from_slice(bytes);
+        } else if !bytes.is_empty() {
+            self.wrong.get_or_insert(Refusal::TooLong);
+            self.held = Vec::new();
+        }
+    }
+
     fn keep(&mut self, byte: u8) {
         if self.wrong.is_some() {
             self.held = Vec::new();

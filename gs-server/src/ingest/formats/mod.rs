@@ -26,7 +26,7 @@ use mission::UtcUs;
 use mission::reception::{Admission, Ear, Receiver, Reception, Refusal, Said, Times, admit};
 use sha2::{Digest as _, Sha256};
 
-pub use export::export;
+pub use export::{CSV_HEAD, csv, export};
 pub use items::{Item, Items};
 pub use tinygs::Topic;
 

@@ -70,6 +70,10 @@ pub(super) fn rx(
     }
     said.times.board =
         fields.whole("usec_time").or_else(|| fields.whole("unix_GS_time")?.checked_mul(1_000_000)).map(UtcUs);
+    if let Some(UtcUs(us)) = said.times.board {
+        // With the time first, what came one after another stands together in the archive's index.
+        said.source_id = format!("{us:016x}-{}", said.source_id);
+    }
     said.signal = Signal {
         frequency_hz: fields.number("frequency").map(hz_of_mhz),
         frequency_offset_hz: fields.number("frequency_offset"),

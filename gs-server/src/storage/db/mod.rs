@@ -5,11 +5,13 @@
 //! once: placeholders `?`, `?1` or `$1`, whole numbers and truth as 64 bits, and nothing that only one database knows.
 //! What really differs (opening, beginning a transaction) says so by `match`.
 
+mod many;
 mod query;
 mod value;
 
+pub(in crate::storage) use many::{fitting, grouped, insert_rows, padded};
 pub(in crate::storage) use query::{Builder, Query, sql};
-pub(in crate::storage) use value::DbRow;
+pub(in crate::storage) use value::{DbRow, Value};
 
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::PgPool;

@@ -48,6 +48,10 @@ macro_rules! on_each {
 }
 
 impl Query {
+    pub(super) const fn new(text: SqlStr, values: Vec<Value>) -> Self {
+        Self { text, values }
+    }
+
     /// The value of the next placeholder.
     pub(in crate::storage) fn bind(mut self, value: impl Into<Value>) -> Self {
         self.values.push(value.into());

@@ -1,12 +1,11 @@
 //! A bulk import against SQLite's own speed with the same bytes.
 //!
-//! `BULK=1000000 cargo nextest run --release -p gs-server --run-ignored all bulk_import --no-capture` measures; the figures are in
-//! docs/ears.md.
+//! `scripts/bench-import` runs it; the figures are in docs/performance.md.
 
 use std::io::Write as _;
 
 use mission::reception::Ear;
-use mission::{Clock as _, SatelliteId};
+use mission::{Clock as _, SatelliteId, UtcUs};
 use rayon::prelude::*;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqliteSynchronous};
 use sqlx::{Connection as _, SqliteConnection};
@@ -16,8 +15,10 @@ use crate::clock::{SystemClock, wall_sleep};
 use crate::config::Config;
 use crate::elements::Offline;
 use crate::ingest::formats::{Context, Format, Items, read};
-use crate::ingest::{Aliases, Ears, Outcome};
+use crate::ingest::{Aliases, Ears, Outcome, TOGETHER_ALONE};
 
+/// After all of them.
+const NOW: UtcUs = UtcUs(1_790_000_000_000_000);
 /// Stations that hear each frame.
 const STATIONS: usize = 5;
 const CONFIG: &str = "[station]\nname = \"roof\"\nclock = \"trust\"\n[[satellites]]\nname = \"pixelsat-1\"\n[[links]]\n\
@@ -66,7 +67,7 @@ async fn plain_s(folder: &std::path::Path, text: &[u8]) -> f64 {
     let lines: Vec<&[u8]> = text.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()).collect();
     let clock = SystemClock::new();
     let began = clock.now();
-    for together in lines.chunks(1_000) {
+    for together in lines.chunks(TOGETHER_ALONE) {
         sql("begin immediate").execute(&mut connection).await.unwrap();
         for lines in together.chunks(250) {
             let mut statement = Builder::new("insert into plain (line) values ");
@@ -80,6 +81,28 @@ async fn plain_s(folder: &std::path::Path, text: &[u8]) -> f64 {
     clock.now().mono.since(began.mono) as f64 / 1e6
 }
 
+/// Seconds for reading, decoding and checking the same lines on all cores, without an archive.
+fn decoded_s(text: &[u8], context: &Context, count: usize) -> f64 {
+    let clock = SystemClock::new();
+    let began = clock.now();
+    let mut items = Items::new(Format::Json, text).map(Result::unwrap);
+    let mut decoded = 0;
+    loop {
+        let together: Vec<_> = items.by_ref().take(TOGETHER_ALONE).collect();
+        if together.is_empty() {
+            break;
+        }
+        let each = |item: &crate::ingest::formats::Item| {
+            let mut out = Vec::new();
+            read(item, context, &mut out);
+            out.iter().flatten().filter(|reception| reception.frame().is_some()).count()
+        };
+        decoded += together.par_iter().map(each).sum::<usize>();
+    }
+    assert_eq!(decoded, count);
+    clock.now().mono.since(began.mono) as f64 / 1e6
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "a measurement"]
 async fn bulk_import_keeps_up_with_sqlite() {
@@ -88,10 +111,15 @@ async fn bulk_import_keeps_up_with_sqlite() {
     let config = Config::from_toml(CONFIG, folder.path()).unwrap();
     let satellite = SatelliteId::new("pixelsat-1").unwrap();
     let text = packets(count);
+    if let Ok(path) = std::env::var("BULK_FILE") {
+        std::fs::write(path, &text).unwrap();
+    }
     let plain_s = plain_s(folder.path(), &text).await;
+    let decoded_s = decoded_s(&text, &Context::file(Aliases::of(&config).admission(&satellite, NOW)), count);
     let mut told = Vec::new();
     for round in ["import", "the same again"] {
         let station = Offline::open(&config).await.unwrap();
+        station.door.store.make_room().await.unwrap();
         let ears = Ears::new(station.door.store.clone(), station.inbox.clone(), station.timer.clone());
         let context = Context::file(Aliases::of(&config).admission(&satellite, ears.now()));
         let began = station.timer.now();
@@ -105,7 +133,7 @@ async fn bulk_import_keeps_up_with_sqlite() {
         };
         let cut = async {
             while items.peek().is_some() {
-                let together: Vec<_> = items.by_ref().take(4_000).collect();
+                let together: Vec<_> = items.by_ref().take(TOGETHER_ALONE).collect();
                 let found: Vec<_> =
                     tokio::task::block_in_place(|| together.par_iter().flat_map_iter(&each).collect());
                 sender.send(found).await.unwrap();
@@ -113,9 +141,11 @@ async fn bulk_import_keeps_up_with_sqlite() {
             drop(sender);
         };
         let take = async {
+            let mut delivery = ears.deliver(&satellite, Ear::File, TOGETHER_ALONE, 60).await.unwrap();
             while let Some(found) = batches.recv().await {
-                sum.add(&ears.take_patiently(&satellite, Ear::File, found, 60).await.unwrap());
+                sum.add(&delivery.push(found).await.unwrap());
             }
+            sum.add(&delivery.end().await.unwrap());
         };
         tokio::join!(cut, take);
         let took_s = station.timer.now().mono.since(began.mono) as f64 / 1e6;
@@ -125,9 +155,16 @@ async fn bulk_import_keeps_up_with_sqlite() {
         wall_sleep(std::time::Duration::from_millis(10)).await;
     }
     println!("{count} packets, {} bytes; plain SQLite {:.0}/s", text.len(), count as f64 / plain_s);
+    println!("decoded only: {:.0}/s", count as f64 / decoded_s);
     for (round, took_s, sum) in &told {
         println!("{round}: {:.0}/s, ratio {:.2}: {sum:?}", count as f64 / took_s, plain_s / took_s);
     }
+    let per_s = |took_s: f64| (count as f64 / took_s).round();
+    let figures = serde_json::json!({
+        "packets": count, "bytes": text.len(), "plain_per_s": per_s(plain_s), "decoded_per_s": per_s(decoded_s),
+        "import_per_s": per_s(told[0].1), "again_per_s": per_s(told[1].1),
+    });
+    println!("{figures}");
     assert_eq!(told[0].2.frames as usize, count.div_ceil(STATIONS));
     assert_eq!(told[1].2, Outcome { repeated: count as u64, ..Outcome::default() });
 }

@@ -283,6 +283,22 @@ impl Writer {
         Ok(())
     }
 
+    /// More memory, and a log of 64 MB before it is moved into the file.
+    pub(super) async fn make_room(&mut self) -> Result<(), StoreError> {
+        let Target::Lite(options) = &mut self.target else { return Ok(()) };
+        let settings = [("cache_size", "-65536"), ("wal_autocheckpoint", "16384")];
+        for (name, value) in settings {
+            if let Some(Connection::Lite(connection)) = &mut self.connection {
+                sqlx::query(AssertSqlSafe(format!("pragma {name} = {value}")))
+                    .persistent(false)
+                    .execute(connection)
+                    .await?;
+            }
+            *options = options.clone().pragma(name, value);
+        }
+        Ok(())
+    }
+
     pub(super) async fn close(&mut self) -> Result<(), StoreError> {
         self.closed = true;
         match self.connection.take() {

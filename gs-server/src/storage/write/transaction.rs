@@ -1,5 +1,7 @@
 //! Records on their way into rows, within one transaction.
 
+use std::collections::HashSet;
+
 use mission::reception::ELSEWHERE;
 use mission::record::{
     AuditRecord, CounterFloorRecord, DownloadRecord, EventRecord, ImageRecord, LimitRecord, PassRecord,
@@ -10,7 +12,7 @@ use sqlx::AssertSqlSafe;
 
 use super::Memory;
 use crate::storage::convert::{int, route};
-use crate::storage::db::{Builder, Connection, sql};
+use crate::storage::db::{Connection, insert_rows, sql};
 use crate::storage::pg::Fence;
 use crate::storage::row::{Row, select, upsert};
 use crate::storage::rows::{
@@ -20,9 +22,6 @@ use crate::storage::rows::{
 };
 use crate::storage::{StoreError, StoredEvent};
 use crate::storage::{audit_chain, ears};
-
-/// Rows in one statement: far below the limit on parameters of either database.
-const ROWS_PER_STATEMENT: usize = 500;
 
 /// A transaction that is open.
 pub(in crate::storage) struct Transaction<'a> {
@@ -37,15 +36,23 @@ impl Transaction<'_> {
     pub(in crate::storage) async fn batch(&mut self, batch: &Batch) -> Result<Vec<StoredEvent>, StoreError> {
         let mut events = Vec::new();
         // What others heard comes by the thousand: in few statements, at the end (references are checked at the commit).
-        let (mut frames, mut reports) = (Vec::new(), Vec::new());
+        let (mut frames, mut reports, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        // Values of one frame twice may not stand in one statement.
+        let mut valued = HashSet::new();
         for record in &batch.records {
             match record {
                 Record::Outside(report) => reports.push(report.as_ref()),
                 Record::Frame(frame) if frame.route.station.as_str() == ELSEWHERE => frames.push(frame),
+                Record::Telemetry(telemetry)
+                    if telemetry.route.station.as_str() == ELSEWHERE && valued.insert(telemetry.frame) =>
+                {
+                    values.extend(self.values(telemetry).await?);
+                }
                 _ => events.extend(self.write(record, batch).await?),
             }
         }
         ears::insert(self.connection, &frames, &reports).await?;
+        self.insert_telemetry(values).await?;
         Ok(events)
     }
 
@@ -205,6 +212,11 @@ impl Transaction<'_> {
     }
 
     async fn telemetry(&mut self, record: &TelemetryRecord) -> Result<(), StoreError> {
+        let rows = self.values(record).await?;
+        self.insert_telemetry(rows).await
+    }
+
+    async fn values(&mut self, record: &TelemetryRecord) -> Result<Vec<TelemetryRow>, StoreError> {
         let Route { satellite, station, link } = &record.route;
         let route = self.route([satellite.as_str(), station.as_str(), link.as_str()]).await?;
         let mut rows = Vec::with_capacity(record.points.len());
@@ -220,34 +232,17 @@ impl Transaction<'_> {
                 decoder_version: i64::from(record.decoder_version),
             });
         }
-        self.insert_telemetry(&rows).await
+        Ok(rows)
     }
 
     /// Inserts values; one that is there already is brought up to date.
     pub(in crate::storage) async fn insert_telemetry(
         &mut self,
-        rows: &[TelemetryRow],
+        rows: Vec<TelemetryRow>,
     ) -> Result<(), StoreError> {
-        for rows in rows.chunks(ROWS_PER_STATEMENT) {
-            let mut statement = Builder::new(
-                "insert into telemetry (parameter, at_us, frame, route, value, decoder_version, crc) values ",
-            );
-            for (at, row) in rows.iter().enumerate() {
-                statement.push(if at == 0 { "(" } else { ", (" }).push_bind(row.parameter);
-                statement.push(", ").push_bind(row.at_us);
-                statement.push(", ").push_bind(row.frame);
-                statement.push(", ").push_bind(row.route);
-                statement.push(", ").push_bind(row.value);
-                statement.push(", ").push_bind(row.decoder_version);
-                statement.push(", ").push_bind(row.crc()).push(")");
-            }
-            statement.push(
-                " on conflict (parameter, at_us, frame) do update set route = excluded.route,
-                 value = excluded.value, decoder_version = excluded.decoder_version, crc = excluded.crc",
-            );
-            statement.build().execute(&mut *self.connection).await?;
-        }
-        Ok(())
+        let tail = " on conflict (parameter, at_us, frame) do update set route = excluded.route,
+             value = excluded.value, decoder_version = excluded.decoder_version, crc = excluded.crc";
+        insert_rows(self.connection, rows, tail).await
     }
 
     /// The number of a satellite, station and link; a new one gets the next.

@@ -10,29 +10,47 @@ use crate::clock::wall_sleep;
 use crate::config::Config;
 use crate::elements::Offline;
 use crate::engine::EngineMessage;
-use crate::storage::{FrameQuery, OutsideQuery, Store};
+use crate::storage::{FrameQuery, OutsideQuery, Page, Store};
+
+mod paths;
 
 const CONFIG: &str = "[station]\nname = \"roof\"\nclock = \"trust\"\n[[satellites]]\nname = \"pixelsat-1\"\n\
     aliases = [\"PixelSat-I\"]\n[[links]]\nname = \"radio\"\nsatellite = \"pixelsat-1\"\nkind = \"tcp\"\n\
     connect = \"localhost:9\"\nsimulated = true\n[storage]\nfolder = \"data\"\nreserve_bytes = 65536\n";
+
+/// Which database.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Lite,
+    Pg,
+}
 
 /// A station whose engine runs, and stops, and runs again.
 struct Bench {
     config: Config,
     station: Option<Offline>,
     satellite: SatelliteId,
+    _database: Option<migrations::cluster::Database>,
     _folder: TempDir,
 }
 
 impl Bench {
     async fn new() -> Self {
+        Self::on(Kind::Lite).await
+    }
+
+    async fn on(kind: Kind) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let config = Config::from_toml(CONFIG, folder.path()).unwrap();
+        let database = (kind == Kind::Pg).then(|| migrations::cluster::Database::fresh().unwrap());
+        let address = database.as_ref().map(|database| database.address().unwrap());
+        let line = address.map(|address| format!("database = \"{address}\"\n")).unwrap_or_default();
+        let config = Config::from_toml(&format!("{CONFIG}{line}"), folder.path()).unwrap();
         config.check().unwrap();
         let mut bench = Self {
             config,
             station: None,
             satellite: SatelliteId::new("pixelsat-1").unwrap(),
+            _database: database,
             _folder: folder,
         };
         bench.restart().await;
@@ -83,9 +101,37 @@ impl Bench {
         }
     }
 
-    async fn receptions(&self) -> usize {
-        let heard = self.store().frames(&FrameQuery::default()).await.unwrap();
-        heard.iter().map(|heard| heard.receptions.len()).sum()
+    async fn receptions(&self) -> i64 {
+        let during = crate::storage::During::default();
+        let (mut count, mut last) = (0, 0);
+        loop {
+            let page = crate::storage::Export::of(self.store()).own(None, &during, last).await.unwrap();
+            let Some((id, _)) = page.last() else { return count };
+            (count, last) = (count + page.len() as i64, *id);
+        }
+    }
+
+    /// The bytes of the newest frame, and how many of ours and how many others heard it.
+    async fn newest(&self) -> (Vec<u8>, usize, usize) {
+        let newest = self.all_frames().await.pop().unwrap();
+        let others = self.store().outside_of(&[newest.frame.id]).await.unwrap();
+        (newest.frame.bytes, newest.receptions.len(), others.get(&newest.frame.id).map_or(0, Vec::len))
+    }
+
+    async fn frame_count(&self) -> usize {
+        self.all_frames().await.len()
+    }
+
+    /// Oldest first.
+    async fn all_frames(&self) -> Vec<crate::storage::Heard> {
+        let (mut all, mut last) = (Vec::new(), 0);
+        loop {
+            let page = Page { after: Some(last), before: None, limit: 500 };
+            let part = self.store().frames(&FrameQuery { page, ..FrameQuery::default() }).await.unwrap();
+            let Some(newest) = part.last() else { return all };
+            last = newest.frame.id;
+            all.extend(part);
+        }
     }
 
     /// Frames, and of the newest how many of ours and how many others heard it.
@@ -189,30 +235,53 @@ async fn deliver(bench: &Bench, way: Way, frame: &[u8], at: UtcUs) -> Option<Out
     Some(bench.take(found).await)
 }
 
+/// All orders of five.
+fn orders() -> Vec<Vec<Way>> {
+    let mut orders = vec![Vec::new()];
+    for _ in WAYS {
+        let longer = orders.iter().flat_map(|order: &Vec<Way>| {
+            let left = WAYS.into_iter().filter(|way| !order.contains(way));
+            left.map(|way| [&order[..], &[way]].concat()).collect::<Vec<_>>()
+        });
+        orders = longer.collect();
+    }
+    orders
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn five_ways_are_one_frame_with_five_receptions_in_any_order_and_across_restarts() {
-    let mut bench = Bench::new().await;
+    five_ways(Kind::Lite).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn five_ways_are_one_frame_with_five_receptions_on_postgresql_too() {
+    five_ways(Kind::Pg).await;
+}
+
+async fn five_ways(kind: Kind) {
+    let mut bench = Bench::on(kind).await;
     let mut frames = 0;
-    for first in 0..WAYS.len() {
-        for (turn, restarts) in [(1, false), (4, true), (2, true)] {
-            let order: Vec<Way> = (0..WAYS.len()).map(|at| WAYS[(first + at * turn) % WAYS.len()]).collect();
-            frames += 1;
-            let frame = heartbeat(frames as u32 * 1_000);
-            let at = bench.now();
-            for way in &order {
-                deliver(&bench, *way, &frame, at).await;
-                if restarts {
-                    bench.restart().await;
-                }
+    assert_eq!(orders().len(), 120);
+    for (number, order) in orders().into_iter().enumerate() {
+        frames += 1;
+        let frame = heartbeat(frames as u32 * 1_000);
+        let at = bench.now();
+        for (place, way) in order.iter().enumerate() {
+            deliver(&bench, *way, &frame, at).await;
+            // Of every fourth order a restart, at each of its places in turn.
+            if number % 4 == 0 && number / 4 % WAYS.len() == place {
+                bench.restart().await;
             }
-            // And all of them once more: nothing changes, but for the radio, whose copy would be a reception.
-            for way in order.iter().filter(|way| **way != Way::Radio) {
-                let again = deliver(&bench, *way, &frame, at).await.unwrap();
-                assert_eq!(again, Outcome { repeated: 1, ..Outcome::default() }, "{way:?} in {order:?}");
-            }
-            assert_eq!(bench.heard().await, (frames, 1, 4), "{order:?}, restarts: {restarts}");
         }
+        // And all of them once more: nothing changes, but for the radio, whose copy would be a reception.
+        for way in order.iter().filter(|way| **way != Way::Radio) {
+            let again = deliver(&bench, *way, &frame, at).await.unwrap();
+            assert_eq!(again, Outcome { repeated: 1, ..Outcome::default() }, "{way:?} in {order:?}");
+        }
+        let (heard, ours, others) = bench.newest().await;
+        assert_eq!((heard, ours, others), (frame, 1, 4), "{order:?}");
     }
+    assert_eq!(bench.frame_count().await, frames);
     assert!(bench.values().await > 20, "values were derived");
     // What was derived stays when everything is derived anew.
     let report = bench.store().redecode(|_| {}).await.unwrap();
