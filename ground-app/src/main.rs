@@ -1,0 +1,2 @@
+//! The operator's desktop app.
+fn main() {}
