@@ -79,6 +79,7 @@ impl Demo {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, self.port)),
             until_image,
             limit_us: self.limit_h * 3_600_000_000,
+            operates: true,
         };
         runtime()?.block_on(self.show(options))
     }

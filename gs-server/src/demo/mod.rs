@@ -55,6 +55,30 @@ pub struct DemoOptions {
     pub until_image: bool,
     /// Then end in vain after so many simulated microseconds.
     pub limit_us: u64,
+    /// Send by itself what an operator would; otherwise only you do.
+    pub operates: bool,
+}
+
+impl DemoOptions {
+    /// To be watched, or flown by hand: passes over a northern station, an air that loses little, no end.
+    ///
+    /// # Errors
+    /// As [`passes`].
+    pub fn to_watch(data: PathBuf, speed: Option<f64>, listen: SocketAddr) -> Result<Self, StationError> {
+        let seed = 1;
+        let channel =
+            ChannelConfig { seed, passes: passes()?, elevation_loss: true, ..ChannelConfig::default() };
+        Ok(Self {
+            data,
+            speed,
+            seed,
+            channel,
+            listen,
+            until_image: false,
+            limit_us: u64::MAX,
+            operates: true,
+        })
+    }
 }
 
 /// The demo's sky: true passes over a station so far north (Svalbard) that the satellite comes by in each revolution.
@@ -206,7 +230,9 @@ async fn direct(
         let in_view = sky.look(now, !options.until_image);
         let status = scene.ready.engine.status();
         progress(&Progress { simulated_s: now.mono.0 as f64 / 1e6, in_view, status: Arc::clone(&status) });
-        operator.act(&status, now).await;
+        if options.operates {
+            operator.act(&status, now).await;
+        }
         let image = status.satellites.first().and_then(|satellite| satellite.image.as_ref());
         if options.until_image && image.is_some_and(|image| image.chunks > 0 && image.held == image.chunks) {
             scene.keep(awake);

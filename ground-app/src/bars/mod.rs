@@ -1,0 +1,7 @@
+//! The frame that is the same on every layout: above, what must never be out of sight; below, what happened last.
+
+mod bottom;
+mod top;
+
+pub(crate) use bottom::bottom;
+pub(crate) use top::top;

@@ -1,0 +1,237 @@
+//! What can be docked. A pane is a function of what is known and of what the operator does; it never waits.
+
+mod alarms;
+mod attitude;
+mod blank;
+mod chunks;
+mod commands;
+mod downlink_map;
+mod elements;
+mod frame;
+mod gallery;
+mod log;
+mod map;
+mod notes;
+mod pass_curves;
+mod pass_plan;
+mod picture;
+mod plan_editor;
+mod plots;
+mod receivers;
+mod rehearsal;
+mod reports;
+mod search;
+mod sky;
+mod station;
+mod timeline;
+mod values;
+
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use crate::desk::Desk;
+use crate::link::Courier;
+use crate::model::Model;
+
+/// What can be docked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pane {
+    /// Where the satellite stands in the sky.
+    Sky,
+    /// Doppler, range, signal over the pass.
+    PassCurves,
+    /// The plan that runs, as a track.
+    PassPlan,
+    /// Commands with their stages; the sender.
+    Commands,
+    /// The picture as it grows.
+    Picture,
+    /// Its chunks.
+    Chunks,
+    /// Values with limits and ages.
+    Values,
+    /// Alarms.
+    Alarms,
+    /// Frames and events, newest first.
+    Log,
+    /// Passes, plans, contacts over days.
+    Timeline,
+    /// The steps of a plan.
+    PlanEditor,
+    /// What the twin made of it.
+    Rehearsal,
+    /// Where chunks are to be sent, on the map.
+    DownlinkMap,
+    /// The body in space.
+    Attitude,
+    /// The world.
+    Map,
+    /// Values over time.
+    Plots,
+    /// All images.
+    Gallery,
+    /// What was: by words, times, kinds.
+    Search,
+    /// One frame, byte by byte.
+    Frame,
+    /// Links, queues, storage, clock.
+    Station,
+    /// Elements and their age.
+    Elements,
+    /// Who hears the satellite.
+    Receivers,
+    /// The operators' log.
+    Notes,
+    /// Reports.
+    Reports,
+}
+
+impl Pane {
+    /// All.
+    pub const ALL: [Self; 24] = [
+        Self::Sky,
+        Self::PassCurves,
+        Self::PassPlan,
+        Self::Commands,
+        Self::Picture,
+        Self::Chunks,
+        Self::Values,
+        Self::Alarms,
+        Self::Log,
+        Self::Timeline,
+        Self::PlanEditor,
+        Self::Rehearsal,
+        Self::DownlinkMap,
+        Self::Attitude,
+        Self::Map,
+        Self::Plots,
+        Self::Gallery,
+        Self::Search,
+        Self::Frame,
+        Self::Station,
+        Self::Elements,
+        Self::Receivers,
+        Self::Notes,
+        Self::Reports,
+    ];
+
+    /// Its name on the screen.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sky => "Sky",
+            Self::PassCurves => "Doppler and signal",
+            Self::PassPlan => "Plan",
+            Self::Commands => "Commands",
+            Self::Picture => "Picture",
+            Self::Chunks => "Chunks",
+            Self::Values => "Values",
+            Self::Alarms => "Alarms",
+            Self::Log => "Frames and events",
+            Self::Timeline => "Timeline",
+            Self::PlanEditor => "Plan editor",
+            Self::Rehearsal => "Rehearsal",
+            Self::DownlinkMap => "Downlink schedule",
+            Self::Attitude => "Attitude",
+            Self::Map => "Map",
+            Self::Plots => "Plots",
+            Self::Gallery => "Images",
+            Self::Search => "Search",
+            Self::Frame => "Frame",
+            Self::Station => "Station",
+            Self::Elements => "Elements",
+            Self::Receivers => "Who hears us",
+            Self::Notes => "Operators' log",
+            Self::Reports => "Reports",
+        }
+    }
+}
+
+/// What a pane is given.
+pub struct Scene<'a> {
+    /// What is known.
+    pub model: &'a Model,
+    /// What is arranged.
+    pub desk: &'a mut Desk,
+    /// Takes questions.
+    pub courier: &'a Courier,
+    /// What panes keep between frames.
+    pub kept: &'a mut Kept,
+    /// Now, on this machine.
+    pub now: Instant,
+    /// Now, at the server: UTC in microseconds since 1970; `None` before its first word.
+    pub now_us: Option<i64>,
+}
+
+impl Scene<'_> {
+    /// The satellite that is looked at, as the station told of it last.
+    #[must_use]
+    pub fn satellite(&self) -> Option<&api::SatelliteView> {
+        let (status, _) = self.model.status.as_ref()?;
+        let chosen = self.desk.satellite.as_deref();
+        let named = |view: &&api::SatelliteView| chosen.is_none_or(|name| view.satellite == name);
+        status.satellites.iter().find(named).or(status.satellites.first())
+    }
+}
+
+/// What panes keep between frames; each its own, none of it worth a file.
+#[derive(Default)]
+#[expect(dead_code, reason = "not every pane keeps something")]
+pub struct Kept {
+    sky: sky::State,
+    pass_curves: pass_curves::State,
+    pass_plan: pass_plan::State,
+    commands: commands::State,
+    picture: picture::State,
+    chunks: chunks::State,
+    values: values::State,
+    alarms: alarms::State,
+    log: log::State,
+    timeline: timeline::State,
+    plan_editor: plan_editor::State,
+    rehearsal: rehearsal::State,
+    downlink_map: downlink_map::State,
+    attitude: attitude::State,
+    map: map::State,
+    plots: plots::State,
+    gallery: gallery::State,
+    search: search::State,
+    frame: frame::State,
+    station: station::State,
+    elements: elements::State,
+    receivers: receivers::State,
+    notes: notes::State,
+    reports: reports::State,
+}
+
+/// Draws a pane.
+pub fn show(pane: Pane, ui: &mut egui::Ui, scene: &mut Scene<'_>) {
+    match pane {
+        Pane::Sky => sky::show(ui, scene),
+        Pane::PassCurves => pass_curves::show(ui, scene),
+        Pane::PassPlan => pass_plan::show(ui, scene),
+        Pane::Commands => commands::show(ui, scene),
+        Pane::Picture => picture::show(ui, scene),
+        Pane::Chunks => chunks::show(ui, scene),
+        Pane::Values => values::show(ui, scene),
+        Pane::Alarms => alarms::show(ui, scene),
+        Pane::Log => log::show(ui, scene),
+        Pane::Timeline => timeline::show(ui, scene),
+        Pane::PlanEditor => plan_editor::show(ui, scene),
+        Pane::Rehearsal => rehearsal::show(ui, scene),
+        Pane::DownlinkMap => downlink_map::show(ui, scene),
+        Pane::Attitude => attitude::show(ui, scene),
+        Pane::Map => map::show(ui, scene),
+        Pane::Plots => plots::show(ui, scene),
+        Pane::Gallery => gallery::show(ui, scene),
+        Pane::Search => search::show(ui, scene),
+        Pane::Frame => frame::show(ui, scene),
+        Pane::Station => station::show(ui, scene),
+        Pane::Elements => elements::show(ui, scene),
+        Pane::Receivers => receivers::show(ui, scene),
+        Pane::Notes => notes::show(ui, scene),
+        Pane::Reports => reports::show(ui, scene),
+    }
+}
