@@ -9,8 +9,13 @@ pub mod fonts;
 pub mod format;
 pub mod geo;
 pub mod hold;
+pub mod labels;
 pub mod lamps;
+pub mod land;
 pub mod level;
+pub mod map;
+pub mod map_base;
+pub mod sky;
 pub mod theme;
 
 pub use level::Level;
