@@ -74,7 +74,23 @@ fn audit_doctor_backup_and_redecode_know_a_postgresql() {
     assert!(told(&disk).contains("fsync = off"), "{disk}");
     let (code, _, error) = verb(&folder, ["redecode"]);
     assert_eq!(code, 3, "the station is at work: {error}");
+    let text = end_to_end::reports::log(0, 3);
+    let items: Vec<Value> = text
+        .lines()
+        .filter_map(|line| line.split_once(' '))
+        .map(|(topic, body)| serde_json::json!({"format": "json", "topic": topic, "text": body}))
+        .collect();
+    let body = serde_json::json!({ "items": items }).to_string();
+    let answer = server.client.post("/api/v1/receptions", "reports", &body).expect("an answer");
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    let (code, beside, error) = verb(&folder, ["export", "--receptions", "--own"]);
+    assert_eq!(code, 0, "{error}");
+    assert!(beside.lines().count() > 15, "15 reports, and what the station heard: {beside}");
+    assert_eq!(beside.matches("\"source\":\"own-mqtt\"").count(), 15, "{beside}");
     server.stop();
+    let (code, alone, error) = verb(&folder, ["export", "--receptions"]);
+    assert_eq!((code, alone.lines().count()), (0, 15), "{error}");
+    assert!(beside.starts_with(&alone), "the same, without a server");
 
     let (code, out, error) = verb(&folder, ["redecode", "--json"]);
     assert_eq!(code, 0, "{error}");

@@ -14,8 +14,8 @@ use super::{Exit, Failure};
 use crate::config::Config;
 use crate::elements::offline::archive;
 use crate::ingest::formats::{CSV_HEAD, csv, export};
-use crate::run::RunError;
-use crate::storage::{During, Export as Reading, OutsideQuery, StoreError};
+use crate::run::{RunError, postgres};
+use crate::storage::{Archive, During, Export as Reading, OutsideQuery, StoreError};
 
 /// `gs-server export`.
 #[derive(Debug, Args)]
@@ -127,7 +127,11 @@ impl Export {
                 written
             }
             Err(RunError::Store(StoreError::Locked { .. })) => {
-                let reading = Reading::beside(&config.storage.folder);
+                let archive = Archive {
+                    folder: config.storage.folder.clone(),
+                    postgres: postgres(config).map_err(failure)?,
+                };
+                let reading = Reading::beside(&archive).await;
                 self.read(&reading.map_err(|error| failure(error.into()))?, lines).await
             }
             Err(error) => Err(failure(error)),

@@ -3,9 +3,10 @@
 use std::io;
 use std::path::PathBuf;
 
+use sqlx::sqlite::SqlitePoolOptions;
 use sqlx::{Connection as _, SqliteConnection};
 
-use super::db::{Connection, sql};
+use super::db::{Connection, Pool, sql};
 use super::{DATABASE, Postgres, StoreError, lite};
 
 /// Where an archive is.
@@ -44,5 +45,17 @@ impl Archive {
             return Err(StoreError::Io { what, source: io::Error::new(io::ErrorKind::NotFound, missing) });
         }
         Ok(Connection::Pg(Box::new(connection)))
+    }
+
+    /// The same as a pool of one connection, for whoever reads on and on.
+    pub(super) async fn readers(&self) -> Result<Pool, StoreError> {
+        // It is there, and can be read.
+        drop(self.reading().await?);
+        match &self.postgres {
+            Some(postgres) => postgres.pool_to_read(),
+            None => Ok(Pool::Lite(
+                SqlitePoolOptions::new().max_connections(1).connect_lazy_with(lite::reader_of(&self.folder)),
+            )),
+        }
     }
 }

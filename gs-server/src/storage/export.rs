@@ -1,20 +1,18 @@
 //! The archive read through from its beginning, page by page: for whoever takes it elsewhere.
 
 use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
 
 use mission::UtcUs;
 use mission::reception::{
     Attribution, Content, Doubts, Ear, RadioCrc, Receiver, Reception, Signal, TimeBasis, Trim, attribute,
 };
-use sqlx::sqlite::SqlitePoolOptions;
 
 use super::db::{Pool, Value, grouped, padded, sql};
 use super::ears::{self, OutsideQuery, OutsideRow};
 use super::row::{Row as _, select};
 use super::rows::{FrameRow, ReceptionRow};
-use super::{DATABASE, During, Page, Store, StoreError, lite};
+use super::{Archive, During, Page, Store, StoreError};
 
 /// Rows of a page.
 const PAGE: u32 = 256;
@@ -31,20 +29,12 @@ impl Export {
         Self(store.0.readers.clone())
     }
 
-    /// Of the file in this folder, beside the server that works there.
+    /// Of this archive, beside the servers that work on it.
     ///
     /// # Errors
-    /// [`StoreError`] when there is none.
-    pub fn beside(folder: &Path) -> Result<Self, StoreError> {
-        let path = folder.join(DATABASE);
-        if !path.is_file() {
-            let missing =
-                std::io::Error::new(std::io::ErrorKind::NotFound, "there is no database in this folder");
-            return Err(StoreError::from_io(&path, missing));
-        }
-        Ok(Self(Pool::Lite(
-            SqlitePoolOptions::new().max_connections(1).connect_lazy_with(lite::reader_of(folder)),
-        )))
+    /// [`StoreError`] when there is none, or it cannot be reached.
+    pub async fn beside(archive: &Archive) -> Result<Self, StoreError> {
+        archive.readers().await.map(Self)
     }
 
     /// The next reports of others behind this number, oldest first; none at the end. Of damaged ones there are the bytes

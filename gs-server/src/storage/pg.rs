@@ -41,6 +41,8 @@ pub(super) const APPLY: Duration = Duration::from_secs(20);
 
 /// Of `pg_advisory_lock`: nobody else opens or migrates.
 const OPENING: i64 = 0x5047_0000_0000;
+/// What the session of a reader asks for.
+const READING: [(&str, &str); 2] = [("default_transaction_read_only", "on"), ("statement_timeout", "60s")];
 /// What the session of a writer asks for.
 const WRITING: [(&str, &str); 1] = [("synchronous_commit", "on")];
 
@@ -96,8 +98,13 @@ impl Postgres {
 
     /// A connection for whoever looks at the archive beside its servers, and writes nothing.
     pub(super) async fn connect_to_read(&self) -> Result<PgConnection, StoreError> {
-        let read_only = [("default_transaction_read_only", "on"), ("statement_timeout", "60s")];
-        connect(&self.options("gs-server look", &read_only)?).await
+        connect(&self.options("gs-server look", &READING)?).await
+    }
+
+    /// The same as a pool, which connects when it is asked for something, and no more than once.
+    pub(super) fn pool_to_read(&self) -> Result<Pool, StoreError> {
+        let pool = PgPoolOptions::new().max_connections(1).acquire_timeout(Duration::from_secs(10));
+        Ok(Pool::Pg(pool.connect_lazy_with(self.options("gs-server look", &READING)?)))
     }
 
     fn options(&self, name: &str, own: &[(&str, &str)]) -> Result<PgConnectOptions, StoreError> {
@@ -233,10 +240,7 @@ pub(super) async fn open(
         .bind(OPENING)
         .execute(&mut *connection)
         .await?;
-    let reading = postgres.options(
-        "gs-server reader",
-        &[("default_transaction_read_only", "on"), ("statement_timeout", "60s")],
-    )?;
+    let reading = postgres.options("gs-server reader", &READING)?;
     let readers = PgPoolOptions::new()
         .max_connections(4)
         .acquire_timeout(Duration::from_secs(10))

@@ -28,6 +28,9 @@ pub struct Times {
     pub server: Option<UtcUs>,
     /// What the message says without naming a clock, or the person who hands it in.
     pub stated: Option<UtcUs>,
+    /// How that stated time is known, and how far off it may be in microseconds, where an archive wrote it down; `None`:
+    /// nobody said.
+    pub stated_as: Option<(TimeBasis, Option<u64>)>,
     /// When the message came in here, for one that was waited for. `None` for a file.
     pub arrived: Option<UtcUs>,
 }
@@ -76,6 +79,17 @@ impl TimeBasis {
         }
     }
 
+    /// How far off such a time usually is, microseconds; `None`: nobody knows.
+    pub const fn usual_error_us(self) -> Option<u64> {
+        match self {
+            Self::BoardAtReception | Self::Stated => Some(BOARD_ERROR_US),
+            Self::Board => Some(AGREES_US),
+            Self::Server => Some(SERVER_ERROR_US),
+            Self::Arrival => Some(ARRIVAL_ERROR_US),
+            Self::BoardAlone | Self::Import => None,
+        }
+    }
+
     /// The basis of that name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|basis| basis.name() == name)
@@ -86,7 +100,8 @@ impl TimeBasis {
 ///
 /// A board's clock that agrees with the server (or, without one, with the arrival) within 5 s, else the server's, else
 /// what was stated, else the arrival; a board's clock alone when there is nothing else. Nothing from before `earliest`
-/// or more than 60 s after `now` counts at all.
+/// or more than 60 s after `now` counts at all. A stated time of which an archive wrote down how it is known stays known
+/// like that: it gets no better by being carried about.
 pub fn choose_time(
     times: &Times,
     now: UtcUs,
@@ -108,6 +123,9 @@ pub fn choose_time(
     };
     let (board, server) = (usable(times.board), usable(times.server));
     let (stated, arrived) = (usable(times.stated), usable(times.arrived));
+    if let (Some(stated), Some((basis, error_us))) = (stated, times.stated_as) {
+        return (stated, basis, error_us);
+    }
     let reference = server.or(stated).or(arrived);
     match (board, reference) {
         (Some(board), Some(reference)) if board.0.abs_diff(reference.0) <= AGREES_US => {
@@ -189,6 +207,23 @@ mod tests {
     fn a_message_that_waited_in_its_board_is_that_uncertain() {
         let waited = Times { board: Some(NOW.plus(-600_000_000)), arrived: Some(NOW), ..Times::default() };
         assert_eq!(chosen(waited), (NOW, TimeBasis::Arrival, Some(600_000_000), vec![Doubt::ClockDisagrees]));
+    }
+
+    #[test]
+    fn what_an_archive_wrote_down_stays_as_it_is_known() {
+        for basis in TimeBasis::ALL {
+            for error_us in [None, Some(42)] {
+                let times = Times {
+                    stated: Some(NOW.plus(-7)),
+                    stated_as: Some((basis, error_us)),
+                    arrived: Some(NOW),
+                    ..Times::default()
+                };
+                assert_eq!(chosen(times), (NOW.plus(-7), basis, error_us, vec![]));
+                let times = Times { stated: Some(UtcUs(31_000_000)), arrived: None, ..times };
+                assert_eq!(chosen(times).1, TimeBasis::Import, "not believed, whatever it says of itself");
+            }
+        }
     }
 
     #[test]

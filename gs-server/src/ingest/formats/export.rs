@@ -1,11 +1,14 @@
 //! Our own export: one reception a line, with everything that is known of it.
 
 use mission::UtcUs;
-use mission::reception::{Content, Ear, RadioCrc, Reception, Refusal, Said, Signal};
+use mission::reception::{Content, Ear, RadioCrc, Reception, Refusal, Said, Signal, TimeBasis};
 use serde_json::{Map, Value, json};
 
 use super::Context;
 use super::value::{Fields, stamp};
+
+/// An error of a time beyond this is none that is known, seconds: a year.
+const ERROR_MOST_S: f64 = 31_536_000.0;
 
 /// The line of a reception.
 pub fn export(reception: &Reception) -> String {
@@ -20,6 +23,7 @@ pub fn export(reception: &Reception) -> String {
         },
         "received_at": time(reception.received_at),
         "time_basis": reception.time_basis.name(),
+        "time_error_s": reception.time_error_us.map(|us| us as f64 / 1e6),
         "frequency_hz": signal.frequency_hz,
         "frequency_offset_hz": signal.frequency_offset_hz,
         "doppler_hz": signal.doppler_hz,
@@ -39,7 +43,7 @@ pub fn export(reception: &Reception) -> String {
 }
 
 /// The names of the columns of [`csv`].
-pub const CSV_HEAD: &str = "received_at,time_basis,kind,source,source_id,receiver,receiver_name,latitude_deg,longitude_deg,\
+pub const CSV_HEAD: &str = "received_at,time_basis,time_error_s,kind,source,source_id,receiver,receiver_name,latitude_deg,longitude_deg,\
     altitude_m,frequency_hz,frequency_offset_hz,doppler_hz,frequency_error_hz,spreading_factor,bandwidth_hz,coding_rate,\
     rssi_dbm,snr_db,radio_crc,noisy,label,norad,hex";
 
@@ -51,6 +55,7 @@ pub fn csv(reception: &Reception) -> String {
     [
         time(reception.received_at).unwrap_or_default(),
         reception.time_basis.name().to_owned(),
+        number(reception.time_error_us.map(|us| us as f64 / 1e6)),
         reception.content.kind().to_owned(),
         reception.ear.name().to_owned(),
         cell(&reception.source_id),
@@ -97,15 +102,30 @@ fn time(at: UtcUs) -> Option<String> {
     jiff::Timestamp::from_microsecond(at.0).ok().map(|at| format!("{at:.6}"))
 }
 
+/// How far off the time may be, microseconds: as the line says; what is usual where an older export or a hand left it out.
+fn error_us(object: &Map<String, Value>, basis: TimeBasis) -> Option<u64> {
+    match object.get("time_error_s") {
+        Some(Value::Null) => None,
+        Some(Value::Number(seconds)) => {
+            let seconds = seconds.as_f64().filter(|seconds| (0.0..=ERROR_MOST_S).contains(seconds));
+            seconds.map(|seconds| (seconds * 1e6).round() as u64)
+        }
+        _ => basis.usual_error_us(),
+    }
+}
+
 /// A line that [`export`] wrote.
 pub(super) fn said(object: &Map<String, Value>, body: &[u8], context: &Context) -> Result<Said, Refusal> {
     let mut fields = Fields::of(object, mission::reception::Doubts::default());
     let ear = fields.text("source").and_then(Ear::from_name).unwrap_or(Ear::File);
     let source_id = fields.text("source_id").ok_or(Refusal::Malformed)?.to_owned();
     let mut said = context.said(ear, source_id);
-    said.times.stated = fields.text("received_at").and_then(stamp).or(said.times.stated);
-    if fields.text("time_basis") == Some("import") {
-        said.times.stated = context.at;
+    let basis = fields.text("time_basis").and_then(TimeBasis::from_name);
+    // Whoever hands in a time knows more than an archive that had none.
+    let is_undated = basis == Some(TimeBasis::Import) && context.at.is_some();
+    if let Some(at) = fields.text("received_at").and_then(stamp).filter(|_| !is_undated) {
+        said.times.stated = Some(at);
+        said.times.stated_as = basis.map(|basis| (basis, error_us(object, basis)));
     }
     said.signal = Signal {
         frequency_hz: fields.number("frequency_hz"),

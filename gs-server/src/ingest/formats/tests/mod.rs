@@ -177,10 +177,46 @@ fn our_own_export_comes_back() {
     let line = export(&was);
     let is = one(Format::Json, line.as_bytes());
     let same = Reception { original: was.original.clone(), content: was.content.clone(), ..is.clone() };
-    let expected =
-        Reception { time_basis: TimeBasis::Stated, time_error_us: is.time_error_us, ..was.clone() };
-    assert_eq!(same, expected);
+    assert_eq!(same, was, "also how its time is known");
     assert_eq!(is.frame(), was.frame());
+    // However it is known, and whatever it may be off by.
+    for time_basis in TimeBasis::ALL {
+        for time_error_us in [None, Some(0), Some(600_000_001)] {
+            let was = Reception { time_basis, time_error_us, ..was.clone() };
+            let is = one(Format::Json, export(&was).as_bytes());
+            assert_eq!((is.time_basis, is.time_error_us), (time_basis, time_error_us));
+            assert_eq!(is.received_at, was.received_at);
+        }
+    }
+}
+
+#[test]
+fn a_time_of_an_export_gets_no_better_on_its_way() {
+    let topic = Topic::parse("tinygs/team/roof/tele/rx").unwrap();
+    let was = rx(&topic, RX.as_bytes(), &context()).remove(0).unwrap();
+    let with = |basis: &str, error: serde_json::Value, at: Option<UtcUs>| {
+        let mut line: serde_json::Value = serde_json::from_str(&export(&was)).unwrap();
+        line["time_basis"] = basis.into();
+        match error {
+            serde_json::Value::Bool(_) => drop(line.as_object_mut().unwrap().remove("time_error_s")),
+            error => line["time_error_s"] = error,
+        }
+        let context = Context { at, ..context() };
+        let found = message(line.to_string().as_bytes(), &context).remove(0).unwrap();
+        (found.received_at, found.time_basis, found.time_error_us)
+    };
+    let (at, nothing) = (was.received_at, serde_json::Value::Bool(false));
+    // An export of an earlier version said how a time is known, and not how well.
+    assert_eq!(with("arrival", nothing.clone(), None), (at, TimeBasis::Arrival, Some(30_000_000)));
+    assert_eq!(with("board-alone", nothing.clone(), None), (at, TimeBasis::BoardAlone, None));
+    for nonsense in [(-1.0).into(), 1e300.into()] {
+        assert_eq!(with("server", nonsense, None), (at, TimeBasis::Server, None));
+    }
+    assert_eq!(with("a guess", 3.0.into(), None).1, TimeBasis::Stated);
+    // Whoever knows when it was may say so, where the archive did not.
+    let told = Some(at.plus(-5_000_000));
+    assert_eq!(with("import", nothing.clone(), told).1, TimeBasis::Stated);
+    assert_eq!(with("import", nothing, None), (at, TimeBasis::Import, None));
 }
 
 #[test]
