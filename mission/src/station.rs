@@ -38,6 +38,7 @@ mod intake;
 mod intents;
 mod journal;
 mod link;
+mod older;
 mod outcome;
 mod outside;
 mod packets;

@@ -183,9 +183,13 @@ impl World {
         }
     }
 
-    /// The image on the ground is the satellite's, byte for byte.
+    /// The image on the ground is the satellite's, byte for byte, and the archive's SHA-256 of it is that of the satellite's.
     pub fn images_equal(&self) -> bool {
-        matches!(self.store.image(), Some((_, Some(bytes))) if bytes == self.device.twin().image())
+        let image = self.device.twin().image();
+        matches!(
+            self.store.image(),
+            Some((record, Some(bytes))) if bytes == image && record.sha256 == Some(Sha256::digest(image).into())
+        )
     }
 
     /// What the engine has stored.

@@ -154,6 +154,78 @@ fn strangers_chunks_fill_the_image_and_replace_nothing() {
     assert!(image.completed_at.is_some());
 }
 
+/// The satellite declares another image of this many chunks, and a minute goes by.
+fn declares(world: &mut World, chunks: u32) -> UtcUs {
+    let declared = world.now.utc;
+    world.hear(&info_frame(0, true, chunks, chunks * 222, 408));
+    world.pass(60 * S);
+    declared
+}
+
+#[test]
+fn late_chunks_fill_the_image_that_was_the_newest_when_they_were_heard() {
+    let mut world = World::in_contact();
+    world.pass(3_600 * S);
+    let before = world.now.utc.plus(-1_000_000);
+    let first = declares(&mut world, 3);
+    world.hear(&chunk_frame(0, 0, 0xAA));
+    let second = declares(&mut world, 4);
+    declares(&mut world, 5);
+    world.hear(&chunk_frame(0, 0, 0x33));
+    let held = |world: &World| -> Vec<(u32, u32, bool)> {
+        let of = |image: &&mission::record::ImageRecord| {
+            (image.held, image.conflicts, image.completed_at.is_some())
+        };
+        let mut images = world.images();
+        images.sort_by_key(|image| image.id);
+        images.iter().map(of).collect()
+    };
+    assert_eq!(held(&world), [(1, 0, false), (0, 0, false), (1, 0, false)]);
+    // Each into its own, in any order, also over a restart; the newest is not touched.
+    world.told(&chunk_frame(0, 1, 0xBB), first.plus(1));
+    world.told(&chunk_frame(0, 1, 0xBC), second.plus(1));
+    assert_eq!(held(&world), [(2, 0, false), (1, 0, false), (1, 0, false)]);
+    world.restart();
+    // The same rules of trust: held is held, another version is a conflict that is told, and both are kept.
+    world.told(&chunk_frame(0, 0, 0xEE), first.plus(2));
+    world.told(&chunk_frame(0, 0, 0xAA), first.plus(3));
+    assert_eq!(held(&world), [(2, 1, false), (1, 0, false), (1, 0, false)]);
+    assert_eq!(world.events(EventKind::ChunkConflict).len(), 1);
+    // From before any of them, or beyond the end of its image: kept raw.
+    world.told(&chunk_frame(0, 2, 0x11), before);
+    world.told(&chunk_frame(0, 3, 0x12), first.plus(4));
+    let undated = report(&world, "u", &chunk_frame(0, 2, 0x13), None);
+    world.deliver(&[undated]);
+    assert_eq!(held(&world), [(2, 1, false), (1, 0, false), (1, 0, false)]);
+    // The last one makes it whole, and says so; what is asked for is the newest's affair.
+    world.told(&chunk_frame(0, 2, 0xCC), second.plus(-1));
+    assert_eq!(held(&world), [(3, 1, true), (1, 0, false), (1, 0, false)]);
+    assert_eq!(world.events(EventKind::ImageComplete).len(), 1);
+    let whole = [[0xAA; 222], [0xBB; 222], [0xCC; 222]].concat();
+    let sha256: [u8; 32] =
+        sha2::Digest::finalize(sha2::Digest::chain_update(sha2::Sha256::default(), whole)).into();
+    let complete = world.images().into_iter().find(|image| image.completed_at.is_some()).unwrap().clone();
+    assert_eq!(complete.sha256, Some(sha256));
+    world.restart();
+    assert_eq!(held(&world), [(3, 1, true), (1, 0, false), (1, 0, false)]);
+}
+
+#[test]
+fn of_many_images_the_oldest_are_let_go_and_their_chunks_are_kept_raw() {
+    let mut world = World::in_contact();
+    world.pass(3_600 * S);
+    let declared: Vec<UtcUs> = (0..11).map(|n| declares(&mut world, 3 + n)).collect();
+    for at in &declared {
+        world.told(&chunk_frame(0, 1, 0xBB), at.plus(1));
+    }
+    let mut images = world.images();
+    images.sort_by_key(|image| image.id);
+    let held: Vec<u32> = images.iter().map(|image| image.held).collect();
+    assert_eq!(held, [0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1], "the newest and eight before it");
+    assert_eq!(mission::snapshot::fits_older([30_000, 1_000, 8_000, 1]), 2, "and no more than 8 MiB");
+    assert_eq!(mission::snapshot::fits_older([65_536]), 0);
+}
+
 #[test]
 fn strangers_prove_nothing_settle_nothing_and_declare_nothing() {
     let mut world = World::in_contact();
