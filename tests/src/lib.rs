@@ -29,6 +29,7 @@ pub mod guide;
 pub mod http;
 pub mod journal;
 pub mod mail;
+pub mod mqtt;
 pub mod operator;
 pub mod overhead;
 pub mod process;

@@ -126,8 +126,16 @@ fn digest(parts: &Parts, body: &Value) -> [u8; 32] {
         hash.update(part);
         hash.update([0]);
     }
-    // Maps of serde_json are ordered by name.
-    hash.update(body.to_string());
+    // Maps of serde_json are ordered by name. No second copy of a long body is made for it.
+    struct Into<'a>(&'a mut Sha256);
+    impl std::fmt::Write for Into<'_> {
+        fn write_str(&mut self, text: &str) -> std::fmt::Result {
+            self.0.update(text);
+            Ok(())
+        }
+    }
+    // A hash takes everything.
+    let _ = std::fmt::Write::write_fmt(&mut Into(&mut hash), format_args!("{body}"));
     hash.finalize().into()
 }
 

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::db::Builder;
-use super::{During, Store, StoreError};
+use mission::reception::Ear;
+
+use super::db::{Builder, sql};
+use super::{Archive, During, Store, StoreError};
 
 /// Newest receptions that medians and places are made of.
 const NEWEST: i64 = 5_000;
@@ -119,6 +121,26 @@ impl Store {
             }
         }
         Ok(())
+    }
+}
+
+impl Archive {
+    /// When a report of each source was taken in last, microseconds since 1970, beside servers that work there.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the database cannot be read.
+    pub async fn heard_by_source(&self) -> Result<BTreeMap<String, i64>, StoreError> {
+        let mut connection = self.reading().await?;
+        let mut heard = BTreeMap::new();
+        for ear in Ear::ALL {
+            let newest =
+                sql("select taken_at_us from outside_receptions where source = ? order by id desc limit 1");
+            if let Some(at_us) = newest.bind(ear.name()).scalar_optional(&mut connection).await? {
+                heard.insert(ear.name().to_owned(), at_us);
+            }
+        }
+        connection.close().await?;
+        Ok(heard)
     }
 }
 

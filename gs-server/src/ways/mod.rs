@@ -36,6 +36,7 @@ use crate::run::RunError;
 use crate::storage::Store;
 
 use boards::Boards;
+pub(crate) use secret::load as secret;
 use status::Way;
 pub use status::WaysHandle;
 

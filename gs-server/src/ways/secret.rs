@@ -8,7 +8,7 @@ use zeroize::Zeroizing;
 ///
 /// # Errors
 /// Why there is none, with the remedy; never the content.
-pub(super) async fn load(path: &Path) -> Result<Zeroizing<String>, String> {
+pub(crate) async fn load(path: &Path) -> Result<Zeroizing<String>, String> {
     let path = path.to_owned();
     let read = tokio::task::spawn_blocking(move || crate::alerts::secret_of_file(&path));
     read.await.map_err(|error| error.to_string())?

@@ -1,5 +1,5 @@
 // How a page begins: somebody is there, the station is read, the stream is followed; and again until the server is there.
-import { get } from "./api.js";
+import { get, hasToken } from "./api.js";
 import { model, takeStation } from "./model.js";
 import { paintNotice } from "./notice.js";
 import { refreshSession } from "./session.js";
@@ -26,6 +26,7 @@ export async function beginPage({ history, started, refresh, event, status, pain
       open() {
         model.live = true;
         model.awaySince = null;
+        model.tokenRefused = false;
         // Somebody may have logged in again, here or in another tab.
         if (model.sessionOver) refreshSession().then(paint).catch(() => {});
         refresh();
@@ -35,8 +36,13 @@ export async function beginPage({ history, started, refresh, event, status, pain
         model.live = false;
         model.awaySince ??= Date.now();
         paint();
-        // A stream ends with its session, and the page says so instead of calling the server away.
-        refreshSession().then(paint).catch(() => {});
+        // A stream ends with its session or its token, and the page says so instead of calling the server away.
+        refreshSession()
+          .then(paint)
+          .catch((error) => {
+            model.tokenRefused = error.status === 401 && hasToken();
+            paint();
+          });
       },
       reset,
     });
@@ -46,8 +52,10 @@ export async function beginPage({ history, started, refresh, event, status, pain
     try {
       await begin();
       return;
-    } catch {
-      model.awaySince ??= Date.now();
+    } catch (error) {
+      // It answers: it is not away.
+      model.tokenRefused = error.status === 401 && hasToken();
+      model.awaySince = model.tokenRefused ? null : (model.awaySince ?? Date.now());
       paintNotice();
       await new Promise((done) => setTimeout(done, AGAIN_MS));
     }

@@ -9,6 +9,7 @@ export const model = {
   live: false, // the stream is open
   awaySince: null, // wall time when it broke
   sessionOver: false, // who was here must log in again
+  tokenRefused: false, // the server does not know the token of the address (any more)
   satellite: null, // name of the satellite shown
 };
 

@@ -5,7 +5,9 @@ import { model } from "./model.js";
 
 export function paintNotice() {
   const lines = [];
-  if (model.sessionOver) {
+  if (model.tokenRefused) {
+    lines.push("The token in this page's address (#token=…) is wrong or has expired. Open the page without it and log in, or open it with a good one: the server's own stands in the file 'token' of its data folder, others are made by 'gs-server token new'.");
+  } else if (model.sessionOver) {
     lines.push("Your session has ended: nobody used it for a while, or it was too old. Log in (above, or in another tab) and this page goes on. What you see is old.");
   } else if (model.awaySince !== null) {
     lines.push(`The server is away since ${clock(model.awaySince)} UTC (this machine's clock). What you see is old. Trying again by itself.`);
@@ -21,5 +23,5 @@ export function paintNotice() {
   document.body.classList.toggle("old-data", model.awaySince !== null);
   const connection = byId("connection");
   connection.classList.toggle("away", !model.live);
-  say(connection, model.live ? "● live" : model.awaySince === null ? "connecting" : model.sessionOver ? "○ logged out" : "○ server away");
+  say(connection, model.live ? "● live" : model.tokenRefused ? "○ token refused" : model.awaySince === null ? "connecting" : model.sessionOver ? "○ logged out" : "○ server away");
 }

@@ -3,6 +3,7 @@
 //! Each check tells what it found, and a remedy when that is not good. Nothing is changed, nothing is radiated, no port is
 //! opened; a server may be running.
 
+mod ears;
 mod machine;
 mod network;
 mod postgres;
@@ -98,6 +99,7 @@ pub async fn examine(file: &Path) -> Vec<Finding> {
     findings.extend(machine::backups(&config, now));
     findings.extend(machine::ports(&config, holder.is_some()));
     findings.extend(network::daemons(&config).await);
+    findings.extend(ears::ways(&config, holder.is_some(), now).await);
     findings.extend(network::server(&config, holder).await);
     findings
 }

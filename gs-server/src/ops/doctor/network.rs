@@ -11,7 +11,7 @@ use crate::clock::within;
 use crate::config::Config;
 
 /// Longer than this nobody is waited for.
-const PATIENCE: Duration = Duration::from_secs(3);
+pub(super) const PATIENCE: Duration = Duration::from_secs(3);
 /// More than any answer of ours.
 const ANSWER_MAX: u64 = 1 << 20;
 

@@ -5,17 +5,19 @@ use std::time::Duration;
 
 use futures_util::{SinkExt as _, StreamExt as _};
 use rumqttc::mqttbytes::v4::{
-    ConnAck, ConnectReturnCode, LastWill, Packet, PubAck, PubComp, PubRec, Publish, SubAck,
-    SubscribeReasonCode, UnsubAck,
+    ConnAck, ConnectReturnCode, LastWill, Packet, PubComp, Publish, SubAck, SubscribeReasonCode, UnsubAck,
 };
 use rumqttc::mqttbytes::{Protocol, QoS};
+use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
 use super::{HELLO_TIME, Shared};
 use crate::clock::{wall_sleep, within};
 use crate::ingest::formats::{RECEPTION_MAX, Topic};
 use crate::ways::boards::Told;
+use crate::ways::intake::Came as Taken;
 use crate::ways::mqtt::wire::{CONNECT, Came, Stream, Wire, wire};
+use crate::ways::mqtt::words::Words;
 
 /// What an answer may take to be written.
 const WRITE_TIME: Duration = Duration::from_secs(10);
@@ -34,8 +36,20 @@ pub(super) struct Session {
     user: Option<String>,
     will: Option<LastWill>,
     silence: Duration,
+    /// What it is to be told when the archive has its messages.
+    words: Words,
     /// What came at QoS 2 and is not released yet.
     unreleased: Vec<u16>,
+}
+
+/// What became of a message.
+enum Published {
+    /// It is dealt with.
+    Done,
+    /// The board says hello, under this topic.
+    Welcome(Topic),
+    /// A word comes when the archive has it.
+    Waits(oneshot::Receiver<()>),
 }
 
 /// How a session ends.
@@ -92,7 +106,15 @@ pub(super) async fn begin(shared: &Shared, stream: Box<dyn Stream>, peer: Socket
         0 => SILENCE,
         seconds => Duration::from_millis(u64::from(seconds) * 1_500),
     };
-    Some(Session { wire, client_id, user, will: connect.last_will, silence, unreleased: Vec::new() })
+    Some(Session {
+        wire,
+        client_id,
+        user,
+        will: connect.last_will,
+        silence,
+        words: Words::default(),
+        unreleased: Vec::new(),
+    })
 }
 
 impl Session {
@@ -106,13 +128,23 @@ impl Session {
         };
         shared.leave(&self.client_id, number);
         if let (End::Lost, Some(will)) = (end, self.will.take()) {
-            self.publish(shared, &will.topic, &will.message).await;
+            self.publish(shared, &will.topic, &will.message, false).await;
         }
     }
 
     async fn talk(&mut self, shared: &Shared) -> End {
         loop {
-            let came = match within(self.silence, self.wire.next()).await {
+            let came = tokio::select! {
+                word = self.words.next(), if self.words.is_any() => {
+                    let Some(Ok(word)) = word else { return End::Lost };
+                    if self.answer(word).await.is_err() {
+                        return End::Lost;
+                    }
+                    continue;
+                }
+                came = within(self.silence, self.wire.next()), if self.words.has_room() => came,
+            };
+            let came = match came {
                 Some(Some(Ok(came))) => came,
                 Some(Some(Err(error))) => {
                     shared.way.count("malformed-packets");
@@ -131,7 +163,7 @@ impl Session {
                     None
                 }
                 Came::Packet(Packet::Publish(publish)) => match self.published(shared, publish).await {
-                    Ok(answer) => answer,
+                    Ok(()) => None,
                     Err(()) => return End::Lost,
                 },
                 Came::Packet(Packet::PubRel(release)) => {
@@ -179,40 +211,44 @@ impl Session {
         }
     }
 
-    async fn published(&mut self, shared: &Shared, publish: Publish) -> Result<Option<Packet>, ()> {
+    async fn published(&mut self, shared: &Shared, publish: Publish) -> Result<(), ()> {
         let again = publish.qos == QoS::ExactlyOnce && self.unreleased.contains(&publish.pkid);
-        if !again && let Some(topic) = self.publish(shared, &publish.topic, &publish.payload).await {
-            self.tune(shared, &topic).await?;
-        }
-        Ok(match publish.qos {
-            QoS::AtMostOnce => None,
-            QoS::AtLeastOnce => Some(Packet::PubAck(PubAck::new(publish.pkid))),
-            QoS::ExactlyOnce => {
-                if !again {
-                    self.unreleased.push(publish.pkid);
-                }
-                if self.unreleased.len() > 32 {
-                    return Err(());
-                }
-                Some(Packet::PubRec(PubRec::new(publish.pkid)))
+        let mut stored = None;
+        if !again {
+            let wants_word = Words::wants(publish.qos);
+            match self.publish(shared, &publish.topic, &publish.payload, wants_word).await {
+                Published::Welcome(topic) => self.tune(shared, &topic).await?,
+                Published::Waits(word) => stored = Some(word),
+                Published::Done => {}
             }
-        })
+        }
+        if publish.qos == QoS::ExactlyOnce && !again {
+            self.unreleased.push(publish.pkid);
+            if self.unreleased.len() > 32 {
+                return Err(());
+            }
+        }
+        self.words.owe(publish.qos, publish.pkid, stored);
+        Ok(())
     }
 
-    /// Takes a message of the board in; gives its topic when it was a welcome.
-    async fn publish(&self, shared: &Shared, topic: &str, payload: &[u8]) -> Option<Topic> {
+    /// Takes a message of the board in.
+    async fn publish(&self, shared: &Shared, topic: &str, payload: &[u8], wants_word: bool) -> Published {
         let parsed = Topic::parse(topic);
         let Some(parsed) = parsed.filter(|topic| self.user.as_ref().is_none_or(|user| *user == topic.user))
         else {
             // A command, somebody else's name, anything: it ends here.
             shared.way.count("messages");
             shared.way.count("other-topics");
-            return None;
+            return Published::Done;
         };
         shared.way.count("messages");
         shared.way.works();
-        let told = shared.intake.of_board(parsed.clone(), payload).await;
-        (told == Told::Welcome).then_some(parsed)
+        match shared.intake.of_board(parsed.clone(), payload, wants_word).await {
+            Taken::Done(Told::Welcome) => Published::Welcome(parsed),
+            Taken::Done(_) => Published::Done,
+            Taken::Waits(word) => Published::Waits(word),
+        }
     }
 
     /// Tells the board that said hello what to listen to, where the configuration says it.

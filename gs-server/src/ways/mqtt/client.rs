@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use futures_util::{SinkExt as _, StreamExt as _};
-use rumqttc::mqttbytes::QoS;
-use rumqttc::mqttbytes::v4::{Packet, PubAck, PubComp, PubRec};
+use rumqttc::mqttbytes::v4::{Packet, PubComp};
 use tokio_util::sync::CancellationToken;
 
 use super::connect::{KEEP_ALIVE_S, NoConnection, connect};
 use super::wire::{Came, Wire};
+use super::words::Words;
 use crate::clock::Timer;
 use crate::config::EarSection;
-use crate::ways::intake::Intake;
+use crate::ways::intake::{Came as Taken, Intake};
 use crate::ways::status::Way;
 
 /// The first pause before another try, microseconds; doubled each time.
@@ -90,13 +90,19 @@ impl Client {
         let period_us = u64::from(KEEP_ALIVE_S) * 500_000;
         let mut ping_at = self.machine.now().mono.plus(period_us);
         let mut heard = self.machine.now().mono;
+        let mut words = Words::default();
         loop {
             let came = tokio::select! {
                 () = stop.cancelled() => {
                     let _ = wire.send(Packet::Disconnect).await;
                     return Ok(());
                 }
-                came = wire.next() => came,
+                word = words.next(), if words.is_any() => {
+                    let Some(Ok(word)) = word else { return Err(broke("the archive takes nothing any more".into())) };
+                    wire.send(word).await.map_err(|error| broke(error.to_string()))?;
+                    continue;
+                }
+                came = wire.next(), if words.has_room() => came,
                 _ = self.machine.sleep_until(ping_at) => {
                     let now = self.machine.now().mono;
                     if now.since(heard) > 3 * period_us {
@@ -109,14 +115,14 @@ impl Client {
             };
             heard = self.machine.now().mono;
             match came {
-                Some(Ok(came)) => self.take(came, &mut wire).await.map_err(broke)?,
+                Some(Ok(came)) => self.take(came, &mut wire, &mut words).await.map_err(broke)?,
                 Some(Err(error)) => return Err(broke(error.to_string())),
                 None => return Err(broke("the broker hung up".into())),
             }
         }
     }
 
-    async fn take(&self, came: Came, wire: &mut Wire) -> Result<(), String> {
+    async fn take(&self, came: Came, wire: &mut Wire, words: &mut Words) -> Result<(), String> {
         let answer = match came {
             Came::TooLong { is_reception } => {
                 if is_reception {
@@ -128,17 +134,20 @@ impl Client {
             }
             Came::Packet(Packet::Publish(publish)) => {
                 // A retained message is an old one, and boards retain nothing.
+                let mut stored = None;
                 if publish.retain {
                     self.way.count("retained");
                 } else {
-                    self.intake.message(&publish.topic, &publish.payload).await;
+                    let wants_word = Words::wants(publish.qos);
+                    if let Taken::Waits(word) =
+                        self.intake.message(&publish.topic, &publish.payload, wants_word).await
+                    {
+                        stored = Some(word);
+                    }
                     self.way.works();
                 }
-                match publish.qos {
-                    QoS::AtMostOnce => None,
-                    QoS::AtLeastOnce => Some(Packet::PubAck(PubAck::new(publish.pkid))),
-                    QoS::ExactlyOnce => Some(Packet::PubRec(PubRec::new(publish.pkid))),
-                }
+                words.owe(publish.qos, publish.pkid, stored);
+                None
             }
             Came::Packet(Packet::PubRel(release)) => Some(Packet::PubComp(PubComp::new(release.pkid))),
             Came::Packet(Packet::PingResp) => {

@@ -3,5 +3,6 @@
 mod client;
 mod connect;
 pub(super) mod wire;
+pub(super) mod words;
 
 pub(super) use client::Client;

@@ -37,7 +37,8 @@ pub(super) enum Answer {
     Failed(String),
 }
 
-pub(super) async fn ask(url: &Url, mut headers: HeaderMap) -> Answer {
+/// Asks once. `silence` is what it may mean when no answer comes, and what to do then.
+pub(super) async fn ask(url: &Url, mut headers: HeaderMap, silence: &str) -> Answer {
     headers.entry(ACCEPT).or_insert(HeaderValue::from_static("application/json"));
     let client = match http_client(url, PATIENCE) {
         Ok(client) => client,
@@ -47,7 +48,8 @@ pub(super) async fn ask(url: &Url, mut headers: HeaderMap) -> Answer {
         Ok(response) => response,
         Err(error) if error.is_timeout() => {
             return Answer::Failed(format!(
-                "no answer within {} s: TinyGS lets requests hang that it does not want; ask them for a token, or import files",
+                "{} gave no answer within {} s; {silence}",
+                url.host_str().unwrap_or_default(),
                 PATIENCE.as_secs()
             ));
         }

@@ -285,7 +285,13 @@ impl Poller {
             .map_err(|error| Broken::Failed(format!("not asked: it cannot be written down ({error})")))?;
         let headers = self.headers().await?;
         self.way.count("requests");
-        match ask::ask(url, headers).await {
+        let silence = match self.section.kind {
+            EarKind::SatnogsDb => {
+                "its database is slow at times: it is asked again, and files can be imported meanwhile"
+            }
+            _ => "TinyGS lets requests hang that it does not want: ask them for a token, or import files",
+        };
+        match ask::ask(url, headers, silence).await {
             Answer::Body(body) => Ok(Some(body)),
             Answer::NotFound => Ok(None),
             Answer::Failed(why) => {

@@ -30,6 +30,16 @@ const HALF_HOUR_US: i64 = 30 * MINUTE_US;
 /// Requests that stations leave for lists.
 const SPARE: u32 = 6;
 
+/// What a look at the list of one name came to.
+enum Found {
+    /// All since the last look.
+    All,
+    /// Some may be missing, in words.
+    Missed(String),
+    /// There is no such list, in words.
+    Nothing(String),
+}
+
 /// What a page of the list holds.
 struct Listed {
     newest_us: i64,
@@ -42,11 +52,17 @@ impl Poller {
     pub(super) async fn look_at_tinygs(&mut self) -> Result<(), Broken> {
         let mut note = None;
         let mut is_stale = None;
+        let mut nowhere = Vec::new();
         for name in self.names.clone() {
             match self.list(&name).await? {
-                Some(missed) => note = Some(missed),
-                None => is_stale = self.is_old(&name).await?.or(is_stale),
+                Found::Missed(missed) => note = Some(missed),
+                Found::All => is_stale = self.is_old(&name).await?.or(is_stale),
+                // The others are asked for first.
+                Found::Nothing(words) => nowhere.push(words),
             }
+        }
+        if !nowhere.is_empty() {
+            return Err(Broken::Failed(nowhere.join("; ")));
         }
         match is_stale {
             Some(words) => self.way.is_stale(words),
@@ -66,8 +82,8 @@ impl Poller {
         Ok(url)
     }
 
-    /// The packets of one name; a word when some may have been missed.
-    async fn list(&mut self, name: &str) -> Result<Option<String>, Broken> {
+    /// The packets of one name.
+    async fn list(&mut self, name: &str) -> Result<Found, Broken> {
         let now = self.now();
         let met_us = self.state.newest_us.get(name).copied();
         let mut before: Option<i64> = None;
@@ -77,7 +93,17 @@ impl Poller {
             let before_ms = before.map(|before_us| (before_us / 1_000).to_string());
             let mut query = vec![("satellite", name)];
             query.extend(before_ms.as_deref().map(|before| ("before", before)));
-            let Some(body) = self.ask(&self.at("packets", &query)?, 0).await? else { break };
+            let url = self.at("packets", &query)?;
+            let Some(body) = self.ask(&url, 0).await? else {
+                // Behind the last page; but the first one is there wherever the address and the name are right.
+                if page > 0 {
+                    break;
+                }
+                return Ok(Found::Nothing(format!(
+                    "{url} is not there (404): there is no API at this address, or TinyGS has no packet under '{name}'. Look at url \
+                     (it ends in the version, /v3/) and at names; before the first packet of a new satellite this is so, too"
+                )));
+            };
             let listed = listed(&body.bytes);
             // First what is whole, also of an answer that was cut; then what is wrong with it.
             let (outcome, ids) = self.take(Ear::TinygsApi, &body.bytes).await?;
@@ -116,7 +142,7 @@ impl Poller {
         if newest_us > 0 {
             self.state.newest_us.insert(name.to_owned(), newest_us);
         }
-        Ok(missed)
+        Ok(missed.map_or(Found::All, Found::Missed))
     }
 
     /// Remembers whose stations to ask for.

@@ -156,16 +156,21 @@ async fn whatever_a_source_says_it_is_asked_less_and_nothing_is_lost() {
     // No answer at all.
     source.now_says(|_| None);
     bench.pass(10 * MINUTE_US).await;
-    failing(&bench, "no answer within").await;
+    failing(&bench, "gave no answer within 2 s; TinyGS lets requests hang").await;
+    // No such list: the address and what to look at are told, and it does not count as working.
+    source.now_says(|_| Some(say(404, "{}")));
+    bench.pass(20 * MINUTE_US).await;
+    failing(&bench, "/v3/packets?satellite=PixelSat-I is not there (404)").await;
+    failing(&bench, "Look at url").await;
     // A pause of two hours is kept to.
     source.now_says(|_| Some(say_with(429, &[("retry-after", "7200")], "slow down")));
-    bench.pass(20 * MINUTE_US).await;
+    bench.pass(40 * MINUTE_US).await;
     failing(&bench, "429").await;
     let asked = source.count();
-    bench.pass(95 * MINUTE_US).await;
+    bench.pass(75 * MINUTE_US).await;
     assert_eq!(source.count(), asked, "it asked for two hours");
     source.now_says(move |_| Some(say(200, &whole)));
-    bench.pass(60 * MINUTE_US).await;
+    bench.pass(80 * MINUTE_US).await;
     bench.way("net", |way| way["state"] == "working").await;
     assert_eq!(bench.heard().await.0, 2);
     bench.stop().await;
@@ -234,6 +239,13 @@ async fn satnogs_is_read_page_by_page_on_its_own_host_only() {
     let way = bench.way("db", |way| way["state"] == "failing").await;
     assert!(way["error"].as_str().unwrap().contains("not followed"), "{way}");
     assert_eq!(elsewhere.count(), 0);
+    // A database that says nothing is not told of as if it were TinyGS.
+    source.now_says(|_| None);
+    bench.pass(200 * MINUTE_US).await;
+    let way = bench
+        .way("db", |way| way["error"].as_str().is_some_and(|words| words.contains("gave no answer within")))
+        .await;
+    assert!(!way.to_string().contains("TinyGS"), "{way}");
     bench.stop().await;
 }
 
