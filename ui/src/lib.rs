@@ -5,17 +5,25 @@
 //! what was clicked, dropped or held, and its owner decides.
 
 pub mod alarms;
+pub mod bands;
+mod chip;
+pub mod chunk_grid;
+pub mod command;
 pub mod fonts;
 pub mod format;
 pub mod geo;
 pub mod hold;
+pub mod inspector;
 pub mod labels;
 pub mod lamps;
 pub mod land;
 pub mod level;
 pub mod map;
 pub mod map_base;
+pub mod plan_track;
+pub mod plot;
 pub mod sky;
+pub mod sparkline;
 pub mod theme;
 
 pub use level::Level;
