@@ -53,9 +53,14 @@ export async function beginPage({ history, started, refresh, event, status, pain
       await begin();
       return;
     } catch (error) {
-      // It answers: it is not away.
+      // It answers: it is not away. Tried again, the same token would count as somebody's guessing.
       model.tokenRefused = error.status === 401 && hasToken();
-      model.awaySince = model.tokenRefused ? null : (model.awaySince ?? Date.now());
+      if (model.tokenRefused) {
+        model.awaySince = null;
+        paintNotice();
+        return;
+      }
+      model.awaySince ??= Date.now();
       paintNotice();
       await new Promise((done) => setTimeout(done, AGAIN_MS));
     }
