@@ -60,13 +60,15 @@ impl App {
                 now,
                 now_us,
             };
+            panes::step(&mut scene);
             egui::Panel::top("top").show(ui, |ui| bars::top(ui, &mut scene));
             egui::Panel::bottom("bottom").show(ui, |ui| bars::bottom(ui, &mut scene));
             egui::CentralPanel::no_frame().show(ui, |ui| tree.ui(&mut Docked { scene: &mut scene }, ui));
         }
         self.desk.trees.insert(layout, tree);
         if let Some(file) = &mut self.file {
-            file.keep(&self.desk, now, false);
+            let is_urgent = std::mem::take(&mut self.desk.is_urgent);
+            file.keep(&self.desk, now, is_urgent);
         }
         ui.ctx().request_repaint_after(TICK);
     }

@@ -4,6 +4,7 @@
 //! Reading names **every** wrong field with its path (`arguments.slots[1].time`) and says what would be right. What is
 //! read obeys the ICD; whether this satellite knows the packet is the engine's business.
 
+mod definition;
 mod read;
 mod write;
 
@@ -12,6 +13,7 @@ use std::fmt;
 use protocol::Telecommand;
 use serde_json::{Map, Value};
 
+pub use definition::{Argument, Critical, DEFINITIONS, Default, Definition, Kind};
 pub use write::arguments;
 
 /// The names of all telecommands, in the order of the ICD.

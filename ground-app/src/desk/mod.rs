@@ -1,5 +1,6 @@
 //! What the operator has arranged: kept in one file, so that a window that is closed, or killed, comes back as it was.
 
+mod commands;
 mod layout;
 mod store;
 
@@ -7,6 +8,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use commands::{Asked, CommandDesk, Draft, Gate, KEPT_MAX, Stack, StackStep, Template};
 pub use layout::Layout;
 pub use store::{DeskFile, DeskFileError};
 
@@ -30,6 +32,11 @@ pub struct Desk {
     pub satellite: Option<String>,
     /// Sound at AOS and for critical alarms.
     pub sound: bool,
+    /// What is prepared to be sent.
+    pub commands: CommandDesk,
+    /// What must be on the disk before the next frame: an idempotency key before it is used.
+    #[serde(skip)]
+    pub is_urgent: bool,
 }
 
 impl Default for Desk {
@@ -42,6 +49,8 @@ impl Default for Desk {
             trees: BTreeMap::new(),
             satellite: None,
             sound: false,
+            commands: CommandDesk::default(),
+            is_urgent: false,
         }
     }
 }

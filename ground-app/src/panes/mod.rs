@@ -11,6 +11,7 @@ mod frame;
 mod gallery;
 mod log;
 mod map;
+mod may;
 mod notes;
 mod pass_curves;
 mod pass_plan;
@@ -174,12 +175,37 @@ impl Scene<'_> {
         let named = |view: &&api::SatelliteView| chosen.is_none_or(|name| view.satellite == name);
         status.satellites.iter().find(named).or(status.satellites.first())
     }
+
+    /// Brings a pane to the front, in this layout or in the one that has it, and gives it the keyboard.
+    pub fn open(&mut self, pane: Pane) {
+        self.kept.to_open = Some(pane);
+    }
+}
+
+/// What goes on whether or not its pane is on the screen. Once a frame, before anything is drawn.
+pub(crate) fn step(scene: &mut Scene<'_>) {
+    commands::step(scene);
+}
+
+/// Silence: the satellite's transmitter off, by one click from anywhere.
+pub fn cease(scene: &mut Scene<'_>) {
+    commands::cease(scene);
+}
+
+/// Opens a draft in the sender, as the palette does. Sends nothing.
+pub fn open_draft(scene: &mut Scene<'_>, draft: crate::desk::Draft) {
+    commands::open(scene, draft);
+    scene.open(Pane::Commands);
 }
 
 /// What panes keep between frames; each its own, none of it worth a file.
 #[derive(Default)]
 #[expect(dead_code, reason = "not every pane keeps something")]
 pub struct Kept {
+    /// The frame that was chosen: the frame pane shows it.
+    pub chosen_frame: Option<u64>,
+    /// A pane that is to be brought to the front.
+    pub(crate) to_open: Option<Pane>,
     sky: sky::State,
     pass_curves: pass_curves::State,
     pass_plan: pass_plan::State,
