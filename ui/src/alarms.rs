@@ -100,7 +100,7 @@ pub struct AlarmList {
 const ROW: f32 = 36.0;
 const COLUMNS: [(&str, Order, f32); 4] = [
     ("Level", Order::Level, 116.0),
-    ("Since", Order::Newest, 72.0),
+    ("Age", Order::Newest, 72.0),
     ("Name", Order::Name, 180.0),
     ("State", Order::State, 0.0),
 ];
@@ -164,8 +164,9 @@ impl AlarmList {
         let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::hover());
         let mut x = rect.left();
         for (title, order, wide) in COLUMNS {
-            let wide = if wide > 0.0 { wide } else { 110.0 };
-            let cell = Rect::from_min_size(pos2(x, rect.top()), vec2(wide, rect.height()));
+            // What has no width of its own stands at the right end, as the words below it do
+            let (left, wide) = if wide > 0.0 { (x, wide) } else { (rect.right() - 60.0, 60.0) };
+            let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(wide, rect.height()));
             let response = ui.interact(cell, ui.scope_id().with(("alarm order", title)), Sense::click());
             if response.clicked() {
                 self.reversed = self.order == order && !self.reversed;

@@ -215,7 +215,7 @@ impl Transmitter {
             Self::Safe => "SAFE",
             Self::Armed => "ARMED",
             Self::OnAir => "ON AIR",
-            Self::Unknown => "TX –",
+            Self::Unknown => "TX ?",
         }
     }
 }

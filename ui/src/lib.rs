@@ -17,6 +17,7 @@ pub mod inspector;
 pub mod labels;
 pub mod lamps;
 pub mod land;
+pub mod lane;
 pub mod level;
 pub mod map;
 pub mod map_base;
@@ -25,6 +26,9 @@ pub mod plot;
 pub mod sky;
 pub mod sparkline;
 pub mod theme;
+pub mod time_axis;
+pub mod timeline;
+pub mod value;
 
 pub use level::Level;
 pub use theme::{Mode, Theme};

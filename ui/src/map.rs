@@ -119,9 +119,11 @@ impl WorldMap {
             painter.rect_filled(projection.rect, 4.0, theme.sea);
             painter.add(self.base.land(projection, theme.land));
             let mut labels = Labels::new();
-            graticule(&painter, projection, theme, &mut labels);
             if let Some(subsolar) = world.subsolar {
                 painter.add(self.base.night(projection, subsolar, theme.night));
+            }
+            graticule(&painter, projection, theme, &mut labels);
+            if let Some(subsolar) = world.subsolar {
                 sun(&painter, projection.at(subsolar), theme);
             }
             paint_world(&painter, projection, world, theme, &mut labels);
@@ -314,7 +316,7 @@ fn paint_world(
                 painter.circle_filled(at, 8.0, colour.gamma_multiply(0.25));
             }
             painter.circle_filled(at, if satellite.is_ours { 5.0 } else { 3.5 }, colour);
-            labels.keep_off(Rect::from_center_size(at, vec2(16.0, 16.0)));
+            labels.keep_off(Rect::from_center_size(at, vec2(12.0, 12.0)));
         }
     }
     let satellites = world.satellites.iter().filter_map(|satellite| {

@@ -165,44 +165,63 @@ fn land_mesh(land: &Land, projection: Projection, colour: Color32) -> Mesh {
             let [west, south, east, north] = piece.bounds;
             let bounds = Rect::from_two_pos(corner(west, south), corner(east, north));
             // What is out of view or smaller than half a point is not drawn
-            if !bounds.intersects(projection.rect) || bounds.size().max_elem() < 0.5 {
-                continue;
-            }
-            let first = mesh.vertices.len() as u32;
-            let vertex = |pos, color| Vertex { pos, uv: WHITE_UV, color };
-            mesh.vertices.extend(piece.corners.iter().map(|c| vertex(corner(c[0], c[1]), colour)));
-            mesh.indices.extend(piece.triangles.iter().map(|index| first + index));
-            for ring in piece.rings.windows(2) {
-                let &[start, end] = ring else { continue };
-                soften(&mut mesh, first as usize + start, first as usize + end, colour, start == 0);
+            if bounds.intersects(projection.rect) && bounds.size().max_elem() >= 0.5 {
+                let corners: Vec<Pos2> = piece.corners.iter().map(|at| corner(at[0], at[1])).collect();
+                fill(&mut mesh, &corners, &piece.triangles, projection.rect, colour);
+                for ring in piece.rings.windows(2) {
+                    let &[start, end] = ring else { continue };
+                    let ring = corners.get(start..end).unwrap_or_default();
+                    soften(&mut mesh, ring, projection.rect, colour, start == 0);
+                }
             }
         }
     }
     mesh
 }
 
+fn vertex(pos: Pos2, color: Color32) -> Vertex {
+    Vertex { pos, uv: WHITE_UV, color }
+}
+
+/// Adds the triangles in view, and of the corners only those that they need: close up, a continent is mostly elsewhere.
+fn fill(mesh: &mut Mesh, corners: &[Pos2], triangles: &[u32], view: Rect, colour: Color32) {
+    let mut taken = vec![u32::MAX; corners.len()];
+    for triangle in triangles.chunks_exact(3) {
+        let at = |index: usize| triangle.get(index).and_then(|corner| corners.get(*corner as usize)).copied();
+        let (Some(a), Some(b), Some(c)) = (at(0), at(1), at(2)) else { continue };
+        if !Rect::from_points(&[a, b, c]).intersects(view) {
+            continue;
+        }
+        for (index, pos) in triangle.iter().zip([a, b, c]) {
+            let Some(taken) = taken.get_mut(*index as usize) else { continue };
+            if *taken == u32::MAX {
+                *taken = mesh.vertices.len() as u32;
+                mesh.vertices.push(vertex(pos, colour));
+            }
+            mesh.indices.push(*taken);
+        }
+    }
+}
+
 /// Adds to each edge of a ring a strip one point wide that fades away from the land.
-fn soften(mesh: &mut Mesh, start: usize, end: usize, colour: Color32, is_outer: bool) {
-    let at = |mesh: &Mesh, index: usize| mesh.vertices.get(index).map_or(Pos2::ZERO, |vertex| vertex.pos);
-    let twice_area: f32 = (start..end)
-        .map(|index| {
-            let next = if index + 1 == end { start } else { index + 1 };
-            let (a, b) = (at(mesh, index), at(mesh, next));
-            a.x * b.y - b.x * a.y
-        })
-        .sum();
+fn soften(mesh: &mut Mesh, ring: &[Pos2], view: Rect, colour: Color32, is_outer: bool) {
+    let edges = || ring.iter().zip(ring.iter().cycle().skip(1));
+    let twice_area: f32 = edges().map(|(a, b)| a.x * b.y - b.x * a.y).sum();
     let outwards = if (twice_area > 0.0) == is_outer { 1.0 } else { -1.0 };
-    for index in start..end {
-        let next = if index + 1 == end { start } else { index + 1 };
-        let (a, b) = (at(mesh, index), at(mesh, next));
+    for (&a, &b) in edges() {
+        if !Rect::from_two_pos(a, b).intersects(view) {
+            continue;
+        }
         let along = (b - a).normalized();
         let out = vec2(along.y, -along.x) * outwards;
         let first = mesh.vertices.len() as u32;
-        for (pos, color) in
-            [(a, colour), (b, colour), (a + out, Color32::TRANSPARENT), (b + out, Color32::TRANSPARENT)]
-        {
-            mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color });
-        }
+        let clear = Color32::TRANSPARENT;
+        mesh.vertices.extend([
+            vertex(a, colour),
+            vertex(b, colour),
+            vertex(a + out, clear),
+            vertex(b + out, clear),
+        ]);
         mesh.indices.extend([first, first + 1, first + 2, first + 1, first + 3, first + 2]);
     }
 }
@@ -221,10 +240,10 @@ fn night_mesh(projection: Projection, subsolar: Place, colour: Color32) -> Mesh 
             let centre = projection.view.centre;
             let place =
                 Place::new(centre.longitude_deg + f64::from(from.x), centre.latitude_deg - f64::from(from.y));
-            let down = (-sun_elevation_deg(place, subsolar) / 18.0).clamp(0.0, 1.0) as f32;
-            // Half of the darkness is there at once, so that the terminator itself is seen
-            let dark = if down > 0.0 { 0.45 + 0.55 * down } else { 0.0 };
-            mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color: colour.gamma_multiply(dark) });
+            let down = -sun_elevation_deg(place, subsolar) as f32;
+            // Half of the darkness comes in civil twilight, so that the terminator itself is seen, and is soft
+            let dark = 0.45 * (down / 6.0).clamp(0.0, 1.0) + 0.55 * (down / 18.0).clamp(0.0, 1.0);
+            mesh.vertices.push(vertex(pos, colour.gamma_multiply(dark)));
         }
     }
     for row in 0..ROWS {
@@ -251,6 +270,13 @@ mod tests {
 
     fn rect() -> Rect {
         Rect::from_min_size(pos2(10.0, 20.0), vec2(800.0, 500.0))
+    }
+
+    #[test]
+    fn close_up_only_what_is_in_view_is_drawn() {
+        let view = View { centre: Place::new(6.6, 46.5), zoom: 40.0 };
+        let mesh = Base::default().land(Projection::new(rect(), view), Color32::GRAY);
+        assert!((3..3_000).contains(&mesh.vertices.len()), "{}", mesh.vertices.len());
     }
 
     #[test]

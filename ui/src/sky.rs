@@ -267,7 +267,7 @@ impl SkyPlot<'_> {
                 painter,
                 within,
                 here,
-                &[across * 15.0, -across * 15.0],
+                &[across * 20.0, -across * 20.0],
                 &text,
                 fonts::small_figures(),
                 theme.dim,

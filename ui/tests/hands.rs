@@ -1,5 +1,7 @@
 //! What hands do to the widgets, by mouse and by keyboard, found by accessible label.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
 use egui_kittest::{Harness, kittest::Queryable as _};
 use ui::alarms::{Alarm, AlarmList, Deed, State};
 use ui::hold::{Hold, TypedWord, hold_button, typed_word};
@@ -151,4 +153,113 @@ fn ten_thousand_alarms_show_the_worst_first_and_return_what_was_asked() {
     harness.get_by_label("Ack value 7777").click();
     harness.run_steps(3);
     assert_eq!(harness.state().asked, Some((7_777, Deed::Acknowledge)));
+}
+
+mod planning {
+    use ui::lane::{Item, Kind, Lane};
+    use ui::timeline::{ItemRef, Timeline, Touched};
+
+    use super::*;
+
+    struct Plan {
+        timeline: Timeline,
+        lanes: Vec<Lane>,
+        touched: Touched,
+    }
+
+    fn item(id: &str, start_s: i64, kind: Kind) -> Item {
+        let start = jiff::Timestamp::from_second(1_795_356_000 + start_s).unwrap();
+        Item {
+            id: id.into(),
+            start,
+            end: start + jiff::SignedDuration::from_secs(600),
+            kind,
+            label: id.into(),
+            hover: String::new(),
+            conflict: None,
+            can_be_dragged: kind == Kind::Plan,
+        }
+    }
+
+    fn harness<'a>() -> Harness<'a, Plan> {
+        let passes = vec![
+            item("first", 1_000, Kind::Pass { quality: 0.3 }),
+            item("second", 3_000, Kind::Pass { quality: 0.9 }),
+        ];
+        let lanes = vec![
+            Lane::new("Passes", passes).taking_drops(),
+            Lane::new("Plans", vec![item("image", 0, Kind::Plan)]),
+        ];
+        let now = jiff::Timestamp::from_second(1_795_356_000).unwrap();
+        let timeline = Timeline::from(now, 4_000.0);
+        Harness::builder().with_size([900.0, 160.0]).build_ui_state(
+            move |ui, plan: &mut Plan| {
+                ui::install(ui.ctx(), Mode::Dark);
+                let touched = plan.timeline.show(ui, &plan.lanes, now);
+                if touched.clicked.is_some() || touched.dropped.is_some() {
+                    plan.touched = touched;
+                }
+            },
+            Plan { timeline, lanes, touched: Touched::default() },
+        )
+    }
+
+    #[test]
+    fn a_plan_is_dropped_on_a_pass() {
+        let mut harness = harness();
+        harness.run_steps(2);
+        let from = harness.get_by_label("Plans image").rect().center();
+        let to = harness.get_by_label("Passes second").rect().center();
+        harness.drag_at(from);
+        harness.run_steps(2);
+        harness.hover_at(from.lerp(to, 0.5));
+        harness.run_steps(2);
+        harness.hover_at(to);
+        harness.run_steps(2);
+        harness.drop_at(to);
+        harness.run_steps(2);
+        let onto = ItemRef { lane: 0, id: "second".into() };
+        assert_eq!(harness.state().touched.dropped, Some(("image".into(), onto)));
+        assert_eq!(harness.state().timeline.start_s, Some(1_795_356_000.0), "the view did not move along");
+    }
+
+    #[test]
+    fn a_click_chooses_and_a_drag_of_the_ground_moves_time() {
+        let mut harness = harness();
+        harness.run_steps(2);
+        harness.get_by_label("Passes first").click();
+        harness.run_steps(2);
+        assert_eq!(harness.state().timeline.selected, Some(ItemRef { lane: 0, id: "first".into() }));
+        let before = harness.state().timeline.start_s.unwrap();
+        harness.drag_at(egui::pos2(600.0, 90.0));
+        harness.run_steps(2);
+        harness.hover_at(egui::pos2(500.0, 90.0));
+        harness.run_steps(2);
+        harness.drop_at(egui::pos2(500.0, 90.0));
+        harness.run_steps(2);
+        assert!(harness.state().timeline.start_s.unwrap() > before + 200.0);
+    }
+
+    #[test]
+    fn the_wheel_zooms_at_the_pointer() {
+        let mut harness = harness();
+        harness.run_steps(2);
+        let pass = harness.get_by_label("Passes second").rect();
+        harness.hover_at(pass.left_center() + egui::vec2(2.0, 0.0));
+        harness.run_steps(1);
+        for _ in 0..5 {
+            harness.event(egui::Event::MouseWheel {
+                unit: egui::MouseWheelUnit::Point,
+                delta: egui::vec2(0.0, 60.0),
+                phase: egui::TouchPhase::Move,
+                source: egui::MouseWheelSource::Wheel,
+                modifiers: egui::Modifiers::NONE,
+            });
+            harness.run_steps(10);
+        }
+        assert!(harness.state().timeline.span_s < 2_000.0, "{}", harness.state().timeline.span_s);
+        let moved = harness.get_by_label("Passes second").rect();
+        assert!((moved.left() - pass.left()).abs() < 6.0, "{pass:?} {moved:?}");
+        assert!(moved.width() > 1.5 * pass.width());
+    }
 }

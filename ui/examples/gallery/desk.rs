@@ -3,8 +3,10 @@
 use egui::Ui;
 use jiff::{SignedDuration, Timestamp};
 use ui::alarms::{Alarm, AlarmList, State};
+use ui::format::Quantity;
 use ui::hold::{Hold, TypedWord, hold_button, typed_word};
 use ui::lamps::{self, Connection, Link, PassTimes, Transmitter};
+use ui::value::{Freshness, Heard, Over, ValueRow, link_meter, value_row};
 use ui::{Level, Theme};
 
 pub(crate) fn now() -> Timestamp {
@@ -110,4 +112,32 @@ pub(crate) fn alarms(ui: &mut Ui) {
     let mut list = AlarmList::default();
     list.selected = Some("Clock".into());
     list.show(ui, &alarms, 0, now());
+}
+
+pub(crate) fn values(ui: &mut Ui) {
+    let out = Freshness::OutOfView { age: seconds(5_400), until: Some(now() + seconds(1_740)) };
+    for (label, value, level, freshness) in [
+        ("Battery voltage", Quantity::of(Some(7.41), 2, "V"), None, Freshness::Fresh),
+        (
+            "OBC temperature",
+            Quantity::of(Some(61.0), 1, "°C"),
+            Some((Level::Distress, Over::Above)),
+            Freshness::Fresh,
+        ),
+        ("Bus current", Quantity::of(Some(-0.312), 3, "A"), None, Freshness::Stale(seconds(95))),
+        ("Yaw", Quantity::of(Some(182.4), 1, "°"), None, out),
+        ("Magnetometer X", Quantity::of(None, 1, "µT"), None, Freshness::Never),
+    ] {
+        value_row(ui, &ValueRow { label, value, level, freshness }, now());
+    }
+    ui.add_space(8.0);
+    let heard: Vec<Heard> = (0..60_i16)
+        .filter(|frame| frame % 7 != 3)
+        .map(|frame| {
+            let arch = (f32::from(frame) / 60.0 * std::f32::consts::PI).sin();
+            let at = now() + seconds(i64::from(frame) * 10 - 600);
+            Heard { at, rssi_dbm: Some(-128.0 + 18.0 * arch), snr_db: Some(-14.0 + 16.0 * arch) }
+        })
+        .collect();
+    link_meter(ui, &heard, now(), seconds(600));
 }

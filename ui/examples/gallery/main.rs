@@ -5,6 +5,7 @@
 
 mod desk;
 mod earth;
+mod time;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -23,6 +24,9 @@ const EXHIBITS: &[Exhibit] = &[
     ("sky", [440.0, 440.0], earth::sky),
     ("sky-north", [440.0, 440.0], earth::sky_over_north),
     ("map", [1000.0, 520.0], earth::map),
+    ("values", [560.0, 240.0], desk::values),
+    ("timeline-days", [1200.0, 220.0], time::days),
+    ("timeline-pass", [1200.0, 220.0], time::one_pass),
     ("map-near", [1000.0, 520.0], earth::map_near),
 ];
 
