@@ -52,6 +52,7 @@ impl App {
         {
             let model = self.link.model();
             let now_us = model.clock.now_us(now);
+            self.kept.turn(&model, now);
             let mut scene = Scene {
                 model: &model,
                 desk: &mut self.desk,

@@ -2,6 +2,7 @@
 
 mod commands;
 mod layout;
+mod plots;
 mod store;
 
 use std::collections::BTreeMap;
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub use commands::{Asked, CommandDesk, Draft, Gate, KEPT_MAX, Stack, StackStep, Template};
 pub use layout::Layout;
+pub use plots::{CURVES_MAX, PLOTS_MAX, PlotsDesk};
 pub use store::{DeskFile, DeskFileError};
 
 use crate::panes::Pane;
@@ -37,6 +39,8 @@ pub struct Desk {
     /// What must be on the disk before the next frame: an idempotency key before it is used.
     #[serde(skip)]
     pub is_urgent: bool,
+    /// The plots.
+    pub plots: PlotsDesk,
 }
 
 impl Default for Desk {
@@ -51,6 +55,7 @@ impl Default for Desk {
             sound: false,
             commands: CommandDesk::default(),
             is_urgent: false,
+            plots: PlotsDesk::default(),
         }
     }
 }

@@ -39,6 +39,8 @@ pub struct Model {
     pub address: String,
     /// How the line is.
     pub connection: Connection,
+    /// Counts archives: what was derived from another one is void.
+    pub world: u64,
     /// What time it is there.
     pub clock: ServerClock,
     /// How the station is, and when that was said.
@@ -100,6 +102,7 @@ impl Model {
         Self {
             address,
             connection: Connection::Connecting,
+            world: 0,
             clock: ServerClock::default(),
             status: None,
             version: Fetched::default(),
@@ -140,6 +143,7 @@ impl Model {
                 // Another archive: what is held is of another world.
                 let fresh = Self {
                     connection: Connection::CatchingUp { version: String::new() },
+                    world: self.world + 1,
                     ..Self::new(self.address.clone())
                 };
                 *self = fresh;
@@ -177,9 +181,10 @@ impl Model {
                 push(&mut self.live_frames, frame, FRAMES_MAX);
                 Vec::new()
             }
-            StreamMessage::Telemetry { satellite, at, values, .. } => {
+            StreamMessage::Telemetry { satellite, at, values, frame, .. } => {
                 for value in values {
-                    self.values.add(&satellite, &value.parameter, &value.unit, at.unix_us(), value.value);
+                    let point = Point { at_us: at.unix_us(), value: value.value, frame };
+                    self.values.add(&satellite, &value.parameter, &value.unit, point);
                 }
                 Vec::new()
             }

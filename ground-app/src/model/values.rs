@@ -12,6 +12,8 @@ pub struct Point {
     pub at_us: i64,
     /// The value; `None`: invalid (a failed sensor).
     pub value: Option<f64>,
+    /// The frame it stands in: with the time it tells two samples apart.
+    pub frame: u64,
 }
 
 /// Values as they came. Times rise within a parameter: what comes late is sorted in.
@@ -25,11 +27,13 @@ struct Held {
     unit: String,
     points: VecDeque<Point>,
     revision: u64,
+    /// The revision at which a value was last put among older ones.
+    disordered_at: u64,
 }
 
 impl Values {
     /// Takes one.
-    pub fn add(&mut self, satellite: &str, parameter: &str, unit: &str, at_us: i64, value: Option<f64>) {
+    pub fn add(&mut self, satellite: &str, parameter: &str, unit: &str, point: Point) {
         if !self.held.contains_key(satellite) {
             self.held.insert(satellite.to_owned(), BTreeMap::new());
         }
@@ -38,13 +42,15 @@ impl Values {
             parameters.insert(parameter.to_owned(), Held { unit: unit.to_owned(), ..Held::default() });
         }
         let Some(held) = parameters.get_mut(parameter) else { return };
-        let point = Point { at_us, value };
-        let place = held.points.partition_point(|other| other.at_us <= at_us);
+        held.revision += 1;
+        let place = held.points.partition_point(|other| other.at_us <= point.at_us);
+        if place < held.points.len() {
+            held.disordered_at = held.revision;
+        }
         held.points.insert(place, point);
         if held.points.len() > VALUES_MAX {
             held.points.pop_front();
         }
-        held.revision += 1;
     }
 
     /// The values of a parameter that came by the stream, oldest first.
@@ -59,6 +65,21 @@ impl Values {
         self.held.get(satellite).and_then(|of| of.get(parameter)).map_or(0, |held| held.revision)
     }
 
+    /// What came after that revision, oldest first; `None` when it is not just what stands last: something came late, or
+    /// more came than is held.
+    #[must_use]
+    pub fn since(
+        &self,
+        satellite: &str,
+        parameter: &str,
+        revision: u64,
+    ) -> Option<impl Iterator<Item = Point>> {
+        let held = self.held.get(satellite)?.get(parameter)?;
+        let new = usize::try_from(held.revision.checked_sub(revision)?).ok()?;
+        let from = held.points.len().checked_sub(new)?;
+        (held.disordered_at <= revision).then(|| held.points.range(from..).copied())
+    }
+
     /// The newest of each parameter: name, unit, point.
     pub fn newest(&self, satellite: &str) -> impl Iterator<Item = (&str, &str, Point)> {
         let of = self.held.get(satellite).into_iter().flatten();
@@ -70,16 +91,39 @@ impl Values {
 mod tests {
     use super::*;
 
+    fn point(at_us: i64, value: Option<f64>) -> Point {
+        Point { at_us, value, frame: 0 }
+    }
+
+    #[test]
+    fn what_is_new_is_told_unless_it_came_late() {
+        let mut values = Values::default();
+        let since = |values: &Values, revision| {
+            values.since("s", "p", revision).map(|new| new.map(|point| point.at_us).collect::<Vec<_>>())
+        };
+        for at in [10, 20] {
+            values.add("s", "p", "V", point(at, None));
+        }
+        let seen = values.revision("s", "p");
+        assert_eq!(since(&values, seen), Some(vec![]));
+        values.add("s", "p", "V", point(20, None));
+        assert_eq!(since(&values, seen), Some(vec![20]));
+        values.add("s", "p", "V", point(15, None));
+        assert_eq!(since(&values, seen), None);
+        assert_eq!(since(&values, values.revision("s", "p")), Some(vec![]));
+        assert_eq!(since(&values, 99), None, "of another world");
+    }
+
     #[test]
     fn what_comes_late_is_sorted_in_and_the_oldest_goes() {
         let mut values = Values::default();
         for at in [3, 1, 2] {
-            values.add("s", "p", "V", at, Some(at as f64));
+            values.add("s", "p", "V", point(at, Some(at as f64)));
         }
         let times: Vec<i64> = values.points("s", "p").unwrap().iter().map(|point| point.at_us).collect();
         assert_eq!(times, [1, 2, 3]);
         for at in 0..VALUES_MAX as i64 {
-            values.add("s", "p", "V", 10 + at, None);
+            values.add("s", "p", "V", point(10 + at, None));
         }
         assert_eq!(values.points("s", "p").unwrap().len(), VALUES_MAX);
         assert_eq!(values.points("s", "p").unwrap()[0].at_us, 10);

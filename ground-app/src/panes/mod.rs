@@ -1,14 +1,17 @@
 //! What can be docked. A pane is a function of what is known and of what the operator does; it never waits.
 
 mod alarms;
+mod album;
 mod attitude;
 mod blank;
 mod chunks;
 mod commands;
 mod downlink_map;
 mod elements;
+mod export;
 mod frame;
 mod gallery;
+mod history;
 mod log;
 mod map;
 mod may;
@@ -26,6 +29,7 @@ mod sky;
 mod station;
 mod timeline;
 mod values;
+mod words;
 
 use std::time::Instant;
 
@@ -230,6 +234,25 @@ pub struct Kept {
     receivers: receivers::State,
     notes: notes::State,
     reports: reports::State,
+    history: history::Histories,
+    album: album::Album,
+    exports: export::Exports,
+    /// The frame that is looked at.
+    opened_frame: Option<u64>,
+    /// Plots point at this time next.
+    point_at: Option<i64>,
+}
+
+impl Kept {
+    /// Once a frame, before the panes: answers that came are taken.
+    pub(crate) fn turn(&mut self, model: &Model, now: Instant) {
+        self.history.turn(model, now);
+    }
+
+    /// Shows this frame in its pane.
+    pub(crate) fn open_frame(&mut self, frame: u64) {
+        self.opened_frame = Some(frame);
+    }
 }
 
 /// Draws a pane.
