@@ -1,13 +1,14 @@
 //! Reports on their way to the engine, some at a time: while one part is being stored the next is looked up.
 
-use std::collections::HashSet;
+use std::collections::{HashSet, VecDeque};
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use mission::SatelliteId;
 use mission::reception::{Delivered, Ear, NotTaken, Reception, Taken};
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
 
-use super::ears::{Ears, EarsError, Outcome};
+use super::ears::{Ears, EarsError, Outcome, TOGETHER};
 use super::formats::Read;
 use crate::engine::EngineMessage;
 use crate::storage::StoreError;
@@ -15,8 +16,28 @@ use crate::storage::StoreError;
 /// Between two tries, microseconds.
 const AGAIN_US: u64 = 1_000_000;
 
-/// What tells a report from all others.
-type Key = (Ear, String, String);
+/// A report, as what tells it from all others.
+struct Key(Arc<Reception>);
+
+impl Key {
+    fn parts(&self) -> (Ear, &str, &str) {
+        (self.0.ear, &self.0.source_id, self.0.receiver_id())
+    }
+}
+
+impl PartialEq for Key {
+    fn eq(&self, other: &Self) -> bool {
+        self.parts() == other.parts()
+    }
+}
+
+impl Eq for Key {}
+
+impl Hash for Key {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.parts().hash(state);
+    }
+}
 
 /// Many reports of one satellite, delivered part by part.
 pub struct Delivery {
@@ -25,7 +46,8 @@ pub struct Delivery {
     ear: Ear,
     together: usize,
     patience: u32,
-    under_way: Option<UnderWay>,
+    /// Oldest first.
+    under_way: VecDeque<UnderWay>,
     _room: OwnedSemaphorePermit,
 }
 
@@ -33,7 +55,6 @@ pub struct Delivery {
 struct UnderWay {
     keys: HashSet<Key>,
     receptions: Vec<Delivered>,
-    repeated: u64,
     answered: oneshot::Receiver<Result<Taken, NotTaken>>,
 }
 
@@ -44,11 +65,11 @@ impl Delivery {
         (together, patience): (usize, u32),
         room: OwnedSemaphorePermit,
     ) -> Self {
-        Self { ears, satellite, ear, together, patience, under_way: None, _room: room }
+        Self { ears, satellite, ear, together, patience, under_way: VecDeque::new(), _room: room }
     }
 
-    /// Hands reports over. What it comes back with is durable: all that was handed over before, but for the last part,
-    /// which is on its way.
+    /// Hands reports over. What it comes back with is durable: all that was handed over before, but for the last parts,
+    /// which are on their way.
     ///
     /// # Errors
     /// [`EarsError`]: a part may have been taken, so deliver all of it again.
@@ -74,40 +95,49 @@ impl Delivery {
         Ok(outcome)
     }
 
-    /// Waits until the last part is durable as well.
+    /// Waits until the last parts are durable as well.
     ///
     /// # Errors
     /// [`EarsError`]: a part may have been taken, so deliver all of it again.
     pub async fn end(mut self) -> Result<Outcome, EarsError> {
-        let outcome = self.settle().await?;
+        let mut outcome = Outcome::default();
+        while !self.under_way.is_empty() {
+            outcome.add(&self.settle().await?);
+        }
         self.ears.took(self.ear, &outcome);
         Ok(outcome)
     }
 
+    /// Parts that the engine may have at once. Where nothing else is done it reads one while the one before is stored.
+    const fn ahead(&self) -> usize {
+        if self.together > TOGETHER { 2 } else { 1 }
+    }
+
     async fn part(&mut self, part: Vec<Reception>) -> Result<Outcome, EarsError> {
         let came = part.len() as u64;
-        // Looked up while the part before is stored; what is new in that one the engine remembers.
-        let receptions = self.new_ones(part).await?;
-        let outcome = self.settle().await?;
-        let repeated = came - receptions.len() as u64;
+        // Looked up while the parts before are stored; what is new in those the engine remembers.
+        let (receptions, keys) = self.new_ones(part).await?;
+        let mut outcome = Outcome { repeated: came - receptions.len() as u64, ..Outcome::default() };
         if receptions.is_empty() {
-            return Ok(Outcome { repeated: outcome.repeated + repeated, ..outcome });
+            return Ok(outcome);
         }
-        let keys = receptions.iter().map(|delivered| key(&delivered.reception)).collect();
+        if self.under_way.len() >= self.ahead() {
+            outcome.add(&self.settle().await?);
+        }
         let answered = self.hand_over(&receptions).await;
-        self.under_way = Some(UnderWay { keys, receptions, repeated, answered });
+        self.under_way.push_back(UnderWay { keys, receptions, answered });
         Ok(outcome)
     }
 
-    /// What the part that is under way came to.
+    /// What the oldest part that is under way came to.
     async fn settle(&mut self) -> Result<Outcome, EarsError> {
-        let Some(UnderWay { receptions, repeated, mut answered, .. }) = self.under_way.take() else {
+        let Some(UnderWay { receptions, mut answered, .. }) = self.under_way.pop_front() else {
             return Ok(Outcome::default());
         };
         let mut tries = self.patience;
         loop {
             match answered.await.map_err(|_| EarsError::Ending)? {
-                Ok(taken) => return Ok(Outcome { repeated, ..Outcome::from(taken) }),
+                Ok(taken) => return Ok(Outcome::from(taken)),
                 Err(NotTaken::Busy) if tries > 0 => {
                     tries -= 1;
                     let timer = self.ears.timer();
@@ -132,27 +162,32 @@ impl Delivery {
     }
 
     /// Those of these reports that are not known, with the frames that are.
-    async fn new_ones(&self, receptions: Vec<Reception>) -> Result<Vec<Delivered>, StoreError> {
+    async fn new_ones(
+        &self,
+        receptions: Vec<Reception>,
+    ) -> Result<(Vec<Delivered>, HashSet<Key>), StoreError> {
         let store = self.ears.store();
-        let mut known = store.known_reports(&receptions.iter().collect::<Vec<_>>()).await?;
-        let before = self.under_way.as_ref().map(|under_way| &under_way.keys);
-        let new: Vec<Reception> = receptions
-            .into_iter()
-            .filter(|report| {
-                let key = key(report);
-                !before.is_some_and(|before| before.contains(&key)) && known.insert(key)
-            })
-            .collect();
-        let frames = store.known_frames(&self.satellite, &new.iter().collect::<Vec<_>>()).await?;
+        let known = store.known_reports(&receptions.iter().collect::<Vec<_>>()).await?;
+        let is_known = |report: &Reception| {
+            let key = || (report.ear, report.source_id.clone(), report.receiver_id().to_owned());
+            !known.is_empty() && known.contains(&key())
+        };
+        let mut keys = HashSet::with_capacity(receptions.len());
+        let mut new = Vec::with_capacity(receptions.len());
+        for reception in receptions.into_iter().filter(|report| !is_known(report)).map(Arc::new) {
+            let key = Key(Arc::clone(&reception));
+            let is_under_way = self.under_way.iter().any(|part| part.keys.contains(&key));
+            if !is_under_way && keys.insert(key) {
+                new.push(reception);
+            }
+        }
+        let frames =
+            store.known_frames(&self.satellite, &new.iter().map(Arc::as_ref).collect::<Vec<_>>()).await?;
         let delivered = new.into_iter().zip(frames).map(|(reception, known)| Delivered {
             satellite: self.satellite.clone(),
-            reception: Arc::new(reception),
+            reception,
             known,
         });
-        Ok(delivered.collect())
+        Ok((delivered.collect(), keys))
     }
-}
-
-fn key(report: &Reception) -> Key {
-    (report.ear, report.source_id.clone(), report.receiver_id().to_owned())
 }

@@ -16,9 +16,8 @@ use crate::storage::{Store, StoreError};
 
 /// Reports that go to the engine together.
 pub const TOGETHER: usize = 1_000;
-/// The same where no radio waits behind them. The engine remembers twice as many frames, so that none of the part under
-/// way is missed.
-pub const TOGETHER_ALONE: usize = 4_000;
+/// The same where no radio waits behind them: fewer and larger transactions.
+pub const TOGETHER_ALONE: usize = 8_000;
 /// Deliveries under way at once, of all sources; others wait.
 const UNDER_WAY: usize = 3;
 

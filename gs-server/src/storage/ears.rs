@@ -6,6 +6,7 @@ use mission::reception::{Content, ELSEWHERE, Ear, Known, Reception, SAME_FRAME_U
 use mission::record::{FrameRecord, OutsideRecord};
 use mission::snapshot::RecentFrame;
 use mission::{FrameId, SatelliteId, UtcUs};
+use sqlx::AssertSqlSafe;
 
 use super::convert::{int, narrow};
 use super::db::{
@@ -150,11 +151,9 @@ pub(super) async fn insert(
     frames: &[&FrameRecord],
     reports: &[&OutsideRecord],
 ) -> Result<(), StoreError> {
-    let frames = frames.iter().map(|frame| FrameRow::of(frame)).collect::<Result<_, _>>()?;
-    insert_rows::<FrameRow>(connection, frames, "").await?;
-    let reports = reports.iter().map(|report| OutsideRow::of(report)).collect::<Result<_, _>>()?;
-    insert_rows::<OutsideRow>(connection, reports, " on conflict (source, source_id, receiver) do nothing")
-        .await
+    insert_rows(connection, frames.iter().map(|frame| FrameRow::of(frame)), "").await?;
+    let reports = reports.iter().map(|report| OutsideRow::of(report));
+    insert_rows(connection, reports, " on conflict (source, source_id, receiver) do nothing").await
 }
 
 /// Which reports of others.
@@ -212,6 +211,46 @@ impl Store {
         reports: &[&Reception],
     ) -> Result<HashSet<(Ear, String, String)>, StoreError> {
         let mut known = HashSet::new();
+        for ear in Ear::ALL {
+            let of_ear = reports.iter().copied().filter(|report| report.ear == ear).collect::<Vec<_>>();
+            if !self.known_in_a_row(ear, &of_ear, &mut known).await? {
+                self.known_each(&of_ear, &mut known).await?;
+            }
+        }
+        Ok(known)
+    }
+
+    /// Whose ids begin with their time stand side by side in the index when they came one after another: one look at all
+    /// between the first and the last, where that is not many more. False when it was no use.
+    async fn known_in_a_row(
+        &self,
+        ear: Ear,
+        reports: &[&Reception],
+        known: &mut HashSet<(Ear, String, String)>,
+    ) -> Result<bool, StoreError> {
+        let ids = || reports.iter().map(|report| report.source_id.as_str());
+        let (Some(first), Some(last)) = (ids().min(), ids().max()) else { return Ok(true) };
+        let most = reports.len() as i64 * 2;
+        let between = "from outside_receptions where source = ? and source_id >= ? and source_id <= ?";
+        let count = sql(AssertSqlSafe(format!("select count(*) from (select 1 {between} limit ?) as found")));
+        let count = count.bind(ear.name()).bind(first).bind(last).bind(most + 1);
+        let count: i64 = count.scalar(&self.0.readers).await?;
+        if count > most || count == 0 {
+            return Ok(count == 0);
+        }
+        let rows = sql(AssertSqlSafe(format!("select source_id, receiver {between}")));
+        for row in &rows.bind(ear.name()).bind(first).bind(last).fetch_all(&self.0.readers).await? {
+            known.insert((ear, row.try_get("source_id")?, row.try_get("receiver")?));
+        }
+        Ok(true)
+    }
+
+    /// Wherever they stand.
+    async fn known_each(
+        &self,
+        reports: &[&Reception],
+        known: &mut HashSet<(Ear, String, String)>,
+    ) -> Result<(), StoreError> {
         let mut rest = reports;
         while !rest.is_empty() {
             let (reports, later) = rest.split_at(fitting(rest.len(), 3));
@@ -231,7 +270,7 @@ impl Store {
                 }
             }
         }
-        Ok(known)
+        Ok(())
     }
 
     /// The frames of the archive that these reports are of, in their order.

@@ -38,6 +38,7 @@ impl Station {
             self.effects.push_back(Effect::Taken { delivery, result: Err(refusal) });
             return;
         }
+        self.recent.make_room(receptions.len());
         let (mut taken, mut told) = (Taken::default(), 0);
         self.kept_raw = 0;
         for delivered in receptions {

@@ -9,8 +9,12 @@ use crate::snapshot::RecentFrame;
 
 /// So many frames of our own radio are remembered.
 const OWN: usize = 256;
-/// So many that only others heard: whatever they send, ours are not forgotten for it.
+/// So many that only others heard: whatever they send, ours are not forgotten for it. More of them where large
+/// deliveries come.
 const OTHERS: usize = 8_192;
+/// So many deliveries' frames are remembered. Two are under way when one is looked up in the archive, one of them perhaps
+/// behind it when it has to come again; and there is the delivery itself.
+const DELIVERIES: usize = 4;
 
 /// A frame that was heard a moment ago.
 #[derive(Debug, Clone)]
@@ -65,6 +69,8 @@ pub(super) const fn nearness(frame: UtcUs, at: UtcUs, id: FrameId) -> (u64, u64)
 pub(super) struct Recents {
     own: Ring,
     others: Ring,
+    /// Reports in the largest delivery.
+    largest: usize,
 }
 
 /// Frames in the order in which they came, found by their mark.
@@ -99,9 +105,14 @@ impl Ring {
 }
 
 impl Recents {
+    /// A delivery of so many reports comes.
+    pub(super) fn make_room(&mut self, reports: usize) {
+        self.largest = self.largest.max(reports);
+    }
+
     pub(super) fn remember(&mut self, recent: Recent) {
         if recent.elsewhere {
-            self.others.push(recent, OTHERS);
+            self.others.push(recent, OTHERS.max(self.largest * DELIVERIES));
         } else {
             self.own.push(recent, OWN);
         }
@@ -116,7 +127,7 @@ impl Recents {
 
     /// Somebody has told when a frame was heard that came without a time.
     pub(super) fn date(&mut self, told: Recent) {
-        let Self { own, others } = self;
+        let Self { own, others, .. } = self;
         let same = [own, others].into_iter().find_map(|ring| {
             let same = ring.by_mark.get_mut(&told.mark())?;
             same.iter_mut().find(|recent| recent.id == told.id)
@@ -129,7 +140,7 @@ impl Recents {
 
     /// The frame with these bytes at this time (and whether that is known).
     pub(super) fn find(&mut self, satellite: usize, bytes: &[u8], at: (UtcUs, bool)) -> Option<&mut Recent> {
-        let Self { own, others } = self;
+        let Self { own, others, .. } = self;
         let found = [own.find(satellite, bytes, at), others.find(satellite, bytes, at)];
         found.into_iter().flatten().min_by_key(|recent| nearness(recent.at, at.0, recent.id))
     }

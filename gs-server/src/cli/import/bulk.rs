@@ -118,8 +118,8 @@ pub(super) async fn import(
     taker: &Taker,
     (bar, stop): (&ProgressBar, &CancellationToken),
 ) -> Result<Sum, Broken> {
-    // Two batches ahead: what is read waits for what is stored.
-    let (sender, mut batches) = mpsc::channel(2);
+    // One batch waits, one is being read: what is read waits for what is stored.
+    let (sender, mut batches) = mpsc::channel(1);
     let is_here = matches!(taker, Taker::Here(..));
     let context = context.clone();
     let cutter = tokio::task::spawn_blocking(move || cut(format, reader, is_here, &context, &sender));

@@ -1,5 +1,9 @@
 //! Many rows by few statements.
 
+use std::pin::pin;
+use std::task::Poll;
+
+use futures_util::poll;
 use sqlx::{AssertSqlSafe, SqlSafeStr as _};
 
 use super::query::Query;
@@ -49,20 +53,42 @@ pub(in crate::storage) fn grouped(
     Query::new(AssertSqlSafe(text).into_sql_str(), values)
 }
 
-/// Inserts rows; `tail` is what stands behind the last one.
+/// Inserts rows; `tail` is what stands behind the last one. While the database works on one statement, the rows of the
+/// next are made.
 pub(in crate::storage) async fn insert_rows<R: Row>(
     connection: &mut Connection,
-    rows: Vec<R>,
+    mut rows: impl ExactSizeIterator<Item = Result<R, StoreError>> + Send,
     tail: &str,
 ) -> Result<(), StoreError> {
-    let mut rows = rows.into_iter();
-    while rows.len() > 0 {
-        let size = fitting(rows.len(), R::COLUMNS);
-        let mut values = Vec::with_capacity(size * R::COLUMNS);
-        rows.by_ref().take(size).for_each(|row| row.give(&mut values));
-        grouped(R::HEAD, (size, R::COLUMNS), tail, values).execute(On::from(&mut *connection)).await?;
+    let mut next = insert_of(&mut rows, tail)?;
+    while let Some(statement) = next {
+        let mut under_way = pin!(statement.execute(On::from(&mut *connection)));
+        // This hands it over; a database that is elsewhere, or has a thread of its own, works from now on.
+        let handed_over = poll!(&mut under_way);
+        let following = insert_of(&mut rows, tail);
+        match handed_over {
+            Poll::Ready(done) => done?,
+            Poll::Pending => under_way.await?,
+        };
+        next = following?;
     }
     Ok(())
+}
+
+/// The statement for as many of these rows as one may hold; `None` when there are none.
+fn insert_of<R: Row>(
+    rows: &mut (impl ExactSizeIterator<Item = Result<R, StoreError>> + Send),
+    tail: &str,
+) -> Result<Option<Query>, StoreError> {
+    if rows.len() == 0 {
+        return Ok(None);
+    }
+    let size = fitting(rows.len(), R::COLUMNS);
+    let mut values = Vec::with_capacity(size * R::COLUMNS);
+    for row in rows.take(size) {
+        row?.give(&mut values);
+    }
+    Ok(Some(grouped(R::HEAD, (size, R::COLUMNS), tail, values)))
 }
 
 #[cfg(test)]

@@ -283,10 +283,11 @@ impl Writer {
         Ok(())
     }
 
-    /// More memory, and a log of 64 MB before it is moved into the file.
+    /// More memory, and a log of 256 MB before it is moved into the file: a page that was written again and again
+    /// meanwhile is moved once.
     pub(super) async fn make_room(&mut self) -> Result<(), StoreError> {
         let Target::Lite(options) = &mut self.target else { return Ok(()) };
-        let settings = [("cache_size", "-65536"), ("wal_autocheckpoint", "16384")];
+        let settings = [("cache_size", "-65536"), ("wal_autocheckpoint", "65536")];
         for (name, value) in settings {
             if let Some(Connection::Lite(connection)) = &mut self.connection {
                 sqlx::query(AssertSqlSafe(format!("pragma {name} = {value}")))

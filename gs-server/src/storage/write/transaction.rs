@@ -242,7 +242,7 @@ impl Transaction<'_> {
     ) -> Result<(), StoreError> {
         let tail = " on conflict (parameter, at_us, frame) do update set route = excluded.route,
              value = excluded.value, decoder_version = excluded.decoder_version, crc = excluded.crc";
-        insert_rows(self.connection, rows, tail).await
+        insert_rows(self.connection, rows.into_iter().map(Ok), tail).await
     }
 
     /// The number of a satellite, station and link; a new one gets the next.
