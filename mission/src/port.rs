@@ -209,7 +209,7 @@ impl LinkState {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     /// Make this durable, whole; answer with `PersistDone` or `PersistFailed`. At most one batch is out at a time.
-    Persist(Batch),
+    Persist(Arc<Batch>),
     /// Raise the witness of this key durably (temporary file, fsync, rename, fsync of the folder); answer.
     Witness {
         /// Which key.

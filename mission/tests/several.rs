@@ -63,7 +63,7 @@ fn records(station: &mut Station) -> Vec<Record> {
     while let Some(effect) = station.next_effect() {
         if let Effect::Persist(batch) = effect {
             let id = batch.id;
-            all.extend(batch.records);
+            all.extend(batch.records.iter().cloned());
             station.handle(NOW, Input::PersistDone(id));
         }
     }

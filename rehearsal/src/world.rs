@@ -1,6 +1,7 @@
 //! The world: every part, one scale of time, one step at a time.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use mission::{
     Accepted, Batch, BatchId, CounterRule, Effect, Entropy, Input, Intent, IntentEnvelope, IntentId,
@@ -36,7 +37,7 @@ impl Entropy for Seeded {
 
 /// What the engine waits for at this very moment; time stands still until it is told.
 enum Due {
-    Persist(Batch),
+    Persist(Arc<Batch>),
     Confirm(BatchId, bool),
     Witness(KeyId, Counter),
 }

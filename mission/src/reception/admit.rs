@@ -60,8 +60,8 @@ pub fn admit(said: Said, admission: &Admission) -> Result<Reception, Refusal> {
     let (received_at, time_basis, time_error_us) =
         choose_time(&said.times, admission.now, admission.earliest, &mut doubts);
     let mut receiver = said.receiver;
-    receiver.id = receiver.id.and_then(|id| plain(&id, ID_MAX, &mut doubts));
-    receiver.name = receiver.name.and_then(|name| plain(&name, NAME_MAX, &mut doubts));
+    receiver.id = receiver.id.and_then(|id| plain(id, ID_MAX, &mut doubts));
+    receiver.name = receiver.name.and_then(|name| plain(name, NAME_MAX, &mut doubts));
     let place = (receiver.latitude_deg, receiver.longitude_deg);
     if !matches!(place, (Some(lat), Some(lon)) if lat.abs() <= 90.0 && lon.abs() <= 180.0) {
         if place != (None, None) {
@@ -72,7 +72,7 @@ pub fn admit(said: Said, admission: &Admission) -> Result<Reception, Refusal> {
     within(&mut receiver.altitude_m, -1_000.0, 20_000.0, Doubt::Altitude, &mut doubts);
     Ok(Reception {
         ear: said.ear,
-        source_id: plain(&said.source_id, ID_MAX, &mut doubts).unwrap_or_default(),
+        source_id: plain(said.source_id, ID_MAX, &mut doubts).unwrap_or_default(),
         receiver,
         received_at,
         time_basis,
@@ -80,7 +80,7 @@ pub fn admit(said: Said, admission: &Admission) -> Result<Reception, Refusal> {
         signal: checked(said.signal, &mut doubts),
         radio_crc: said.radio_crc,
         noisy: said.noisy,
-        label: said.label.and_then(|label| plain(&label, NAME_MAX, &mut doubts)),
+        label: said.label.and_then(|label| plain(label, NAME_MAX, &mut doubts)),
         norad: said.norad.filter(|norad| *norad != 0),
         content,
         doubts,
@@ -118,7 +118,7 @@ fn within(value: &mut Option<f64>, least: f64, most: f64, doubt: Doubt, doubts: 
 }
 
 /// Text that may be shown: no control characters, nothing that turns the direction of writing, not too long.
-fn plain(text: &str, most: usize, doubts: &mut Doubts) -> Option<String> {
+fn plain(text: String, most: usize, doubts: &mut Doubts) -> Option<String> {
     let unseen = |c: char| {
         c.is_control()
             || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
@@ -126,6 +126,9 @@ fn plain(text: &str, most: usize, doubts: &mut Doubts) -> Option<String> {
     // As nearly all names are.
     let trimmed = text.trim();
     if trimmed.len() <= most && trimmed.bytes().all(|byte| matches!(byte, 0x20..=0x7E)) {
+        if trimmed.len() == text.len() {
+            return (!text.is_empty()).then_some(text);
+        }
         return (!trimmed.is_empty()).then(|| trimmed.to_owned());
     }
     let mut kept: String = text.trim().chars().filter(|c| !unseen(*c)).take(most).collect();

@@ -1,5 +1,7 @@
 //! Whose bytes are these: by their content, never by what somebody called them.
 
+use std::borrow::Cow;
+
 use protocol::{DOWN_MAGIC, DownFrame, FRAME_LEN, SHORT_OVERHEAD};
 
 use super::repair::{Repair, repair};
@@ -48,7 +50,7 @@ pub fn attribute(delivered: &[u8]) -> Attribution {
     if delivered.starts_with(TEST_PACKET) {
         return Attribution::Test;
     }
-    let mut damaged: Option<Vec<u8>> = None;
+    let mut damaged: Option<Cow<'_, [u8]>> = None;
     for bits in 0..8_u8 {
         for bytes in 0..=HEADER_MAX {
             let Some(rest) = delivered.get(bytes..) else { break };
@@ -82,9 +84,9 @@ fn begins_with_magic(bytes: &[u8], bits: u8) -> bool {
 }
 
 /// The bytes without their first bits; the last byte is filled up with zeros.
-fn shifted(bytes: &[u8], bits: u8) -> Vec<u8> {
+fn shifted(bytes: &[u8], bits: u8) -> Cow<'_, [u8]> {
     if bits == 0 {
-        return bytes.to_vec();
+        return Cow::Borrowed(bytes);
     }
     let next = bytes.iter().skip(1).copied().chain(std::iter::once(0));
     bytes.iter().zip(next).map(|(byte, next)| byte << bits | next >> (8 - bits)).collect()

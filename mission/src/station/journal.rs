@@ -1,6 +1,7 @@
 //! What is to be made durable, in order, one batch at a time; and what may happen only after that.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use crate::clock::MonoUs;
 use crate::id::BatchId;
@@ -22,7 +23,7 @@ pub(super) struct Ticket(u64);
 #[derive(Debug, Default)]
 pub(super) struct Journal {
     pending: Vec<Record>,
-    in_flight: Option<Batch>,
+    in_flight: Option<Arc<Batch>>,
     retry_at: Option<MonoUs>,
     issued: u64,
     durable: u64,
@@ -108,8 +109,9 @@ impl Journal {
             }
         } else if !self.pending.is_empty() {
             self.issued += 1;
-            let batch = Batch { id: BatchId(self.issued), records: std::mem::take(&mut self.pending) };
-            self.in_flight = Some(batch.clone());
+            let records = std::mem::take(&mut self.pending);
+            let batch = Arc::new(Batch { id: BatchId(self.issued), records });
+            self.in_flight = Some(Arc::clone(&batch));
             out.push_back(Effect::Persist(batch));
         }
         while self.replies.front().is_some_and(|(ticket, _)| ticket.0 <= self.durable) {

@@ -237,7 +237,7 @@ impl World {
         match self.waiting.pop_front().expect("something to confirm") {
             Effect::Persist(batch) => {
                 self.seen.push(Seen::Stored(batch.records.iter().map(kind).collect()));
-                self.stored.extend(batch.records);
+                self.stored.extend(batch.records.iter().cloned());
                 self.station.handle(self.now, Input::PersistDone(batch.id));
             }
             Effect::Witness { key, counter } => {

@@ -31,7 +31,7 @@ impl Entropy for Seeded {
 
 /// What the engine waits for at this very moment.
 pub(super) enum Due {
-    Persist(Batch),
+    Persist(Arc<Batch>),
     Confirm(BatchId, bool),
     Witness(KeyId, Counter),
 }

@@ -2,9 +2,10 @@
 
 use mission::UtcUs;
 use mission::reception::{Content, Ear, RadioCrc, Reception, Refusal, Said, Signal, TimeBasis};
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use super::Context;
+use super::tree::{Object, Value};
 use super::value::{Fields, stamp};
 
 /// An error of a time beyond this is none that is known, seconds: a year.
@@ -115,7 +116,7 @@ fn error_us(object: &Map<String, Value>, basis: TimeBasis) -> Option<u64> {
 }
 
 /// A line that [`export`] wrote.
-pub(super) fn said(object: &Map<String, Value>, body: &[u8], context: &Context) -> Result<Said, Refusal> {
+pub(super) fn said(object: &Object<'_>, body: &[u8], context: &Context) -> Result<Said, Refusal> {
     let mut fields = Fields::of(object, mission::reception::Doubts::default());
     let ear = fields.text("source").and_then(Ear::from_name).unwrap_or(Ear::File);
     let source_id = fields.text("source_id").ok_or(Refusal::Malformed)?.to_owned();

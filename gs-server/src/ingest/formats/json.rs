@@ -1,8 +1,8 @@
 //! Objects cut out of JSON, NDJSON, arrays and the answers that wrap them, byte by byte; and what each of them is.
 
 use mission::reception::{Refusal, Said};
-use serde_json::Value;
 
+use super::tree::Object;
 use super::{Context, DEPTH_MAX, PACKET_MAX, export, satnogs, tinygs};
 
 /// Bytes of a line before its object that are kept: a topic.
@@ -264,7 +264,7 @@ pub(super) fn said(
     take: &mut dyn FnMut(Result<Said, Refusal>),
 ) {
     let is_long = body.len() > super::RECEPTION_MAX;
-    let Ok(Value::Object(object)) = serde_json::from_slice::<Value>(body) else {
+    let Some(object) = Object::parse(body) else {
         return take(Err(Refusal::Malformed));
     };
     if is_long && !(object.contains_key("raw") && object.contains_key("stations")) {

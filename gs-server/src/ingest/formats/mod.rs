@@ -15,6 +15,7 @@ mod kiss;
 mod place;
 mod satnogs;
 mod tinygs;
+mod tree;
 mod value;
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
 //! SatNOGS DB: frames as its API tells them, and the lines of its export.
 
 use mission::reception::{Ear, Refusal, Said};
-use serde_json::{Map, Value};
 
 use super::place::of_observer;
+use super::tree::Object;
 use super::value::{Fields, stamp};
 use super::{Context, digest};
 
 /// One element of the answer of `/api/telemetry/`.
-pub(super) fn object(object: &Map<String, Value>, body: &[u8], context: &Context) -> Result<Said, Refusal> {
+pub(super) fn object(object: &Object<'_>, body: &[u8], context: &Context) -> Result<Said, Refusal> {
     let mut fields = Fields::of(object, mission::reception::Doubts::default());
     let hex = fields.text("frame").ok_or(Refusal::NoBytes)?;
     let (time, observer) = (fields.text("timestamp"), fields.text("observer"));

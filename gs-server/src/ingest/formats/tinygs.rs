@@ -6,8 +6,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use mission::UtcUs;
 use mission::reception::{Ear, RadioCrc, Receiver, Refusal, Said, Signal};
-use serde_json::{Map, Value};
 
+use super::tree::{Object, Value};
 use super::value::{Fields, hz_of_mhz};
 use super::{Context, digest};
 
@@ -52,7 +52,7 @@ impl fmt::Display for Topic {
 /// One received packet, as a board publishes it.
 pub(super) fn rx(
     topic: Option<&str>,
-    object: &Map<String, Value>,
+    object: &Object<'_>,
     body: &[u8],
     context: &Context,
 ) -> Result<Said, Refusal> {
@@ -102,7 +102,7 @@ pub(super) fn rx(
 
 /// A packet as the HTTP API tells it: one reception without a receiver, or one for each station that is listed.
 pub(super) fn packet(
-    object: &Map<String, Value>,
+    object: &Object<'_>,
     body: &[u8],
     context: &Context,
     take: &mut dyn FnMut(Result<Said, Refusal>),
@@ -129,7 +129,7 @@ pub(super) fn packet(
     said.norad = fields.catalogue("norad");
     said.doubts = fields.doubts;
     said.bytes = Some(bytes);
-    let stations = object.get("stations").and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
+    let stations = object.get("stations").and_then(Value::as_array).unwrap_or_default();
     if stations.is_empty() {
         if body.len() > super::RECEPTION_MAX {
             return take(Err(Refusal::TooLong));
@@ -150,7 +150,7 @@ pub(super) fn packet(
 }
 
 /// The reception of one of the stations that a packet lists.
-fn by_station(mut said: Said, station: &Map<String, Value>) -> Said {
+fn by_station(mut said: Said, station: &Object<'_>) -> Said {
     let mut fields = Fields::of(station, said.doubts);
     let name = fields.text("name").map(str::to_owned);
     let user = fields.whole("userId");

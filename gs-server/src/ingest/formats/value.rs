@@ -5,20 +5,21 @@ use jiff::civil::DateTime;
 use jiff::tz::TimeZone;
 use mission::UtcUs;
 use mission::reception::{Doubt, Doubts};
-use serde_json::{Map, Value};
+
+use super::tree::{Object, Value};
 
 /// One object and what was found wrong with it.
 pub(super) struct Fields<'a> {
-    pub(super) object: &'a Map<String, Value>,
+    pub(super) object: &'a Object<'a>,
     pub(super) doubts: Doubts,
 }
 
 impl<'a> Fields<'a> {
-    pub(super) const fn of(object: &'a Map<String, Value>, doubts: Doubts) -> Self {
+    pub(super) const fn of(object: &'a Object<'a>, doubts: Doubts) -> Self {
         Self { object, doubts }
     }
 
-    fn take<T>(&mut self, key: &str, read: impl Fn(&'a Value) -> Option<T>) -> Option<T> {
+    fn take<T>(&mut self, key: &str, read: impl Fn(&'a Value<'a>) -> Option<T>) -> Option<T> {
         let value = self.object.get(key).filter(|value| !value.is_null())?;
         let read = read(value);
         if read.is_none() {
