@@ -104,11 +104,11 @@ fn time(at: UtcUs) -> Option<String> {
 }
 
 /// How far off the time may be, microseconds: as the line says; what is usual where an older export or a hand left it out.
-fn error_us(object: &Map<String, Value>, basis: TimeBasis) -> Option<u64> {
+fn error_us(object: &Object<'_>, basis: TimeBasis) -> Option<u64> {
     match object.get("time_error_s") {
         Some(Value::Null) => None,
-        Some(Value::Number(seconds)) => {
-            let seconds = seconds.as_f64().filter(|seconds| (0.0..=ERROR_MOST_S).contains(seconds));
+        Some(told @ (Value::Count(_) | Value::Below(_) | Value::Number(_))) => {
+            let seconds = told.as_f64().filter(|seconds| (0.0..=ERROR_MOST_S).contains(seconds));
             seconds.map(|seconds| (seconds * 1e6).round() as u64)
         }
         _ => basis.usual_error_us(),
