@@ -2,15 +2,19 @@
 
 use std::time::Duration;
 
-use egui_tiles::{Behavior, SimplificationOptions, TileId, UiResponse};
+use egui_tiles::{Behavior, SimplificationOptions, TileId, Tiles, UiResponse};
 
 use crate::desk::{Desk, DeskFile};
+use crate::keys::{self, Deed};
 use crate::link::Link;
+use crate::palette::{Act, Palette};
 use crate::panes::{self, Kept, Pane, Scene};
-use crate::{bars, clock};
+use crate::{bars, clock, help};
 
 /// The window is drawn again after this long although nothing came: times go on.
 const TICK: Duration = Duration::from_millis(250);
+/// Everything is between so many times its own size.
+const ZOOM: std::ops::RangeInclusive<f32> = 0.5..=3.0;
 
 /// The window on one server.
 pub struct App {
@@ -18,6 +22,8 @@ pub struct App {
     desk: Desk,
     file: Option<DeskFile>,
     kept: Kept,
+    palette: Palette,
+    help: bool,
     drawn_theme: Option<ui::Mode>,
 }
 
@@ -25,7 +31,8 @@ impl App {
     /// A window. Without a file the desk is forgotten at the end.
     #[must_use]
     pub fn new(link: Link, desk: Desk, file: Option<DeskFile>) -> Self {
-        Self { link, desk, file, kept: Kept::default(), drawn_theme: None }
+        let (kept, palette) = (Kept::default(), Palette::default());
+        Self { link, desk, file, kept, palette, help: false, drawn_theme: None }
     }
 
     /// What is known, to look at.
@@ -42,13 +49,8 @@ impl App {
 
     /// Draws one frame.
     pub fn show(&mut self, ui: &mut egui::Ui) {
-        let now = clock::instant();
-        if self.drawn_theme != Some(self.desk.theme) {
-            ui::theme::apply(ui.ctx(), self.desk.theme);
-            self.drawn_theme = Some(self.desk.theme);
-        }
-        let mut tree = self.desk.take_tree();
-        let layout = self.desk.layout;
+        let (now, context) = (clock::instant(), ui.ctx().clone());
+        self.dress(&context);
         {
             let model = self.link.model();
             let now_us = model.clock.now_us(now);
@@ -62,16 +64,46 @@ impl App {
                 now_us,
             };
             panes::step(&mut scene);
+            let mut acts: Vec<Act> = keys::pressed(&context).into_iter().map(Act::Deed).collect();
+            acts.extend(self.palette.show(&context, &scene));
+            help::show(&context, &mut self.help);
+            for act in acts {
+                match act {
+                    Act::Deed(Deed::Palette) => self.palette.open(),
+                    Act::Deed(Deed::Help) => self.help = !self.help,
+                    act => perform(act, &context, &mut scene),
+                }
+            }
+            if let Some(pane) = scene.kept.to_open.take() {
+                scene.desk.show_pane(pane);
+                scene.kept.keyboard_for = Some(pane);
+            }
             egui::Panel::top("top").show(ui, |ui| bars::top(ui, &mut scene));
             egui::Panel::bottom("bottom").show(ui, |ui| bars::bottom(ui, &mut scene));
+            let (place, mut tree) = (scene.desk.place(), scene.desk.take_tree());
             egui::CentralPanel::no_frame().show(ui, |ui| tree.ui(&mut Docked { scene: &mut scene }, ui));
+            scene.desk.put_tree(place, tree);
         }
-        self.desk.trees.insert(layout, tree);
         if let Some(file) = &mut self.file {
             let is_urgent = std::mem::take(&mut self.desk.is_urgent);
             file.keep(&self.desk, now, is_urgent);
         }
-        ui.ctx().request_repaint_after(TICK);
+        context.request_repaint_after(TICK);
+    }
+
+    fn dress(&mut self, context: &egui::Context) {
+        if self.drawn_theme != Some(self.desk.theme) {
+            if self.drawn_theme.is_none() {
+                // Ours, since it is to be remembered
+                context.options_mut(|options| options.zoom_with_keyboard = false);
+            }
+            ui::theme::apply(context, self.desk.theme);
+            self.drawn_theme = Some(self.desk.theme);
+        }
+        let zoom = self.desk.zoom.clamp(*ZOOM.start(), *ZOOM.end());
+        if (context.zoom_factor() - zoom).abs() > 1e-3 {
+            context.set_zoom_factor(zoom);
+        }
     }
 
     /// Writes the desk down at once.
@@ -80,6 +112,39 @@ impl App {
             file.keep(&self.desk, clock::instant(), true);
         }
     }
+}
+
+fn perform(act: Act, context: &egui::Context, scene: &mut Scene<'_>) {
+    let deed = match act {
+        Act::Deed(deed) => deed,
+        Act::Pane(pane) => return scene.open(pane),
+        Act::Satellite(name) => return scene.desk.satellite = Some(name),
+        Act::Saved(name) => return scene.desk.show_saved(&name),
+        Act::Call(call) => return call(scene),
+    };
+    let zoomed = |zoom: f32| ((zoom * 10.0).round() / 10.0).clamp(*ZOOM.start(), *ZOOM.end());
+    match deed {
+        Deed::Layout(layout) => scene.desk.show_layout(layout),
+        Deed::Alarms => scene.open(Pane::Alarms),
+        Deed::Search => scene.open(Pane::Search),
+        Deed::Pause => scene.kept.paused = !scene.kept.paused,
+        Deed::Theme => {
+            scene.desk.theme = match scene.desk.theme {
+                ui::Mode::Dark => ui::Mode::Light,
+                ui::Mode::Light => ui::Mode::Dark,
+            };
+        }
+        Deed::Larger => scene.desk.zoom = zoomed(scene.desk.zoom + 0.1),
+        Deed::Smaller => scene.desk.zoom = zoomed(scene.desk.zoom - 0.1),
+        Deed::AsItWas => scene.desk.zoom = 1.0,
+        Deed::FullScreen => {
+            let full = context.input(|input| input.viewport().fullscreen.unwrap_or(false));
+            context.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
+        }
+        // The window has done these
+        Deed::Palette | Deed::Help => {}
+    }
+    context.request_repaint();
 }
 
 impl eframe::App for App {
@@ -107,6 +172,10 @@ impl Behavior<Pane> for Docked<'_, '_> {
 
     fn tab_title_for_pane(&mut self, pane: &Pane) -> egui::WidgetText {
         pane.name().into()
+    }
+
+    fn is_tab_closable(&self, _tiles: &Tiles<Pane>, _tile: TileId) -> bool {
+        true
     }
 
     fn simplification_options(&self) -> SimplificationOptions {

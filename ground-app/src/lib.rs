@@ -9,6 +9,8 @@
 //! | [`model`] | what is known of the server: plain values with their age |
 //! | [`desk`] | what the operator has arranged: layout, theme, drafts; kept in one file |
 //! | `bars` | the frame that is the same on every layout |
+//! | [`keys`] | what keys do: one table for the window, the palette and the list under `?` |
+//! | [`palette`] | whatever can be done, found by typing |
 //! | [`panes`] | what can be docked: one file each |
 //! | [`app`] | the window: keys, bars, panes |
 //! | `embedded` | the server and the satellite inside |
@@ -20,8 +22,11 @@ pub mod clock;
 pub mod desk;
 #[cfg(feature = "embedded")]
 pub mod embedded;
+mod help;
+pub mod keys;
 pub mod link;
 pub mod model;
+pub mod palette;
 pub mod panes;
 
 pub use app::App;

@@ -32,6 +32,7 @@ fn main() -> anyhow::Result<()> {
         ..eframe::NativeOptions::default()
     };
     let begin = move |context: &eframe::CreationContext<'_>| {
+        ui::install(&context.egui_ctx, desk.theme);
         let window = context.egui_ctx.clone();
         let link = Link::open(&server, Arc::new(move || window.request_repaint()))?;
         Ok(Box::new(App::new(link, desk, Some(file))) as Box<dyn eframe::App>)

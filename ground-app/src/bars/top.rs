@@ -11,7 +11,7 @@ pub(crate) fn top(ui: &mut egui::Ui, scene: &mut Scene<'_>) {
         ui.weak(station.as_deref().unwrap_or("no station"));
         for layout in Layout::ALL {
             if ui.selectable_label(scene.desk.layout == layout, layout.name()).clicked() {
-                scene.desk.layout = layout;
+                scene.desk.show_layout(layout);
             }
         }
     });

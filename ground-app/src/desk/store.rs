@@ -108,8 +108,8 @@ mod tests {
         let path = folder.path().join("deep/desk.json");
         let (mut file, mut desk, _) = DeskFile::open(&path).unwrap();
         desk.layout = Layout::Images;
-        let tree = desk.take_tree();
-        desk.put_tree(tree);
+        let (place, tree) = (desk.place(), desk.take_tree());
+        desk.put_tree(place, tree);
         file.keep(&desk, crate::clock::instant(), false);
         assert_eq!(file.failure(), None);
         let (_, again, told) = DeskFile::open(&path).unwrap();

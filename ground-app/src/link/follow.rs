@@ -117,7 +117,7 @@ impl Follower {
             Resource::Frames => fetch!(frames, client.frames(&Filter::new().limit(200))),
             Resource::Events => fetch!(events, client.events(&newest)),
             Resource::Elements => fetch!(elements, client.elements(&Filter::new().limit(100))),
-            Resource::Receivers => fetch!(receivers, client.receivers(&newest)),
+            Resource::Receivers => fetch!(receivers, client.receivers(&Filter::new())),
         }
     }
 }

@@ -38,6 +38,7 @@ use serde::{Deserialize, Serialize};
 use crate::desk::Desk;
 use crate::link::Courier;
 use crate::model::Model;
+use crate::palette::Entry;
 
 /// What can be docked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -184,6 +185,16 @@ impl Scene<'_> {
     pub fn open(&mut self, pane: Pane) {
         self.kept.to_open = Some(pane);
     }
+
+    /// Whether this pane was opened just now and should take the keyboard; true once.
+    pub fn takes_keyboard(&mut self, pane: Pane) -> bool {
+        self.kept.keyboard_for.take_if(|wanted| *wanted == pane).is_some()
+    }
+}
+
+/// What panes offer in the palette. Each opens, chooses or fills in; none may send anything by itself.
+pub(crate) fn entries(_scene: &Scene<'_>) -> Vec<Entry> {
+    Vec::new()
 }
 
 /// What goes on whether or not its pane is on the screen. Once a frame, before anything is drawn.
@@ -206,10 +217,14 @@ pub fn open_draft(scene: &mut Scene<'_>, draft: crate::desk::Draft) {
 #[derive(Default)]
 #[expect(dead_code, reason = "not every pane keeps something")]
 pub struct Kept {
+    /// What is live is held still: lists and plots stay as they are. Nothing is lost by it.
+    pub paused: bool,
     /// The frame that was chosen: the frame pane shows it.
     pub chosen_frame: Option<u64>,
     /// A pane that is to be brought to the front.
     pub(crate) to_open: Option<Pane>,
+    /// A pane that is to take the keyboard.
+    pub(crate) keyboard_for: Option<Pane>,
     sky: sky::State,
     pass_curves: pass_curves::State,
     pass_plan: pass_plan::State,
