@@ -20,6 +20,10 @@ fn it_connects_and_keys_show_layouts_theme_palette_and_the_list_of_keys() {
         assert!(seat.has(layout.name()), "{layout:?}");
     }
 
+    seat.click("Satellite");
+    assert_eq!(seat.harness.state().desk().layout, Layout::Satellite);
+    seat.layout(Layout::Pass);
+
     seat.press_with(Modifiers::COMMAND, Key::T);
     assert_eq!(seat.harness.state().desk().theme, ui::Mode::Light);
     assert!(!seat.harness.ctx.global_style().visuals.dark_mode);
