@@ -98,7 +98,7 @@ pub use run::{
 };
 pub use sky::{
     ElementsUsed, ElementsView, FineTime, LookList, LookView, PassEndWord, PassKept, PassList, PassView,
-    RefusedElements, SkyGapView,
+    PlaceView, RefusedElements, SkyGapView,
 };
 pub use station::{
     CounterConfirmation, ElementsInUse, ImageProgress, LinkView, NextPass, SatelliteView, SealingView,

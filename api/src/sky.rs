@@ -196,12 +196,29 @@ pub struct PassList {
     pub frequency_hz: Option<f64>,
     /// UT1-UTC.
     pub ut1_minus_utc_s: f64,
+    /// Where the station stands; `null` from a server that does not tell it yet.
+    #[serde(default)]
+    pub place: Option<PlaceView>,
     /// The passes, in order of AOS.
     pub passes: Vec<PassView>,
     /// Where the elements have no state.
     pub gaps: Vec<SkyGapView>,
     /// Satellites that were asked for and have no elements.
     pub without_elements: Vec<String>,
+}
+
+/// A place from which the sky is looked at.
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlaceView {
+    /// Geodetic latitude (WGS84), north positive.
+    pub latitude_deg: f64,
+    /// Longitude, east positive.
+    pub longitude_deg: f64,
+    /// Height above the ellipsoid.
+    pub height_m: f64,
+    /// What the horizon hides: pairs of azimuth and elevation, straight lines between them; empty for a free view.
+    pub horizon_deg: Vec<[f64; 2]>,
 }
 
 /// Where satellites stand at instants, computed when it was asked for. Same words as `gs-server look --json`.

@@ -13,6 +13,7 @@
 //! | [`palette`] | whatever can be done, found by typing |
 //! | [`panes`] | what can be docked: one file each |
 //! | [`app`] | the window: keys, bars, panes |
+//! | [`orbit`] | where the satellite is, computed here |
 //! | `embedded` | the server and the satellite inside |
 
 pub mod app;
@@ -26,6 +27,7 @@ mod help;
 pub mod keys;
 pub mod link;
 pub mod model;
+pub mod orbit;
 pub mod palette;
 pub mod panes;
 

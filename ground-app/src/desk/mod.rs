@@ -2,6 +2,7 @@
 
 mod commands;
 mod layout;
+mod plans;
 mod plots;
 mod store;
 
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 pub use commands::{Asked, CommandDesk, Draft, Gate, KEPT_MAX, Stack, StackStep, Template};
 pub use layout::Layout;
+pub use plans::{PlanDesk, PlanDraft};
 pub use plots::{CURVES_MAX, PLOTS_MAX, PlotsDesk};
 pub use store::{DeskFile, DeskFileError};
 
@@ -46,6 +48,8 @@ pub struct Desk {
     pub is_urgent: bool,
     /// The plots.
     pub plots: PlotsDesk,
+    /// Plans being written.
+    pub plans: PlanDesk,
 }
 
 impl Default for Desk {
@@ -63,6 +67,7 @@ impl Default for Desk {
             commands: CommandDesk::default(),
             is_urgent: false,
             plots: PlotsDesk::default(),
+            plans: PlanDesk::default(),
         }
     }
 }

@@ -6,6 +6,7 @@ mod attitude;
 mod blank;
 mod chunks;
 mod commands;
+mod deed;
 mod downlink_map;
 mod elements;
 mod export;
@@ -20,6 +21,7 @@ mod pass_curves;
 mod pass_plan;
 mod picture;
 mod plan_editor;
+mod plan_words;
 mod plots;
 mod receivers;
 mod rehearsal;
@@ -225,6 +227,7 @@ pub struct Kept {
     pub(crate) to_open: Option<Pane>,
     /// A pane that is to take the keyboard.
     pub(crate) keyboard_for: Option<Pane>,
+    orbits: crate::orbit::Orbits,
     sky: sky::State,
     pass_curves: pass_curves::State,
     pass_plan: pass_plan::State,

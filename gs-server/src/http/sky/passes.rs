@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use api::{ElementsUsed, FineTime, Page, PassKept, PassList};
+use api::{ElementsUsed, FineTime, Page, PassKept, PassList, PlaceView};
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
@@ -49,6 +49,12 @@ pub(in crate::http) async fn passes(
         min_elevation_deg: search.min_elevation_deg,
         frequency_hz,
         ut1_minus_utc_s: site.orientation.ut1_minus_utc_s(),
+        place: Some(PlaceView {
+            latitude_deg: site.place.latitude_deg(),
+            longitude_deg: site.place.longitude_deg(),
+            height_m: site.place.height_m(),
+            horizon_deg: site.place.mask().points().iter().map(|&(azimuth, up)| [azimuth, up]).collect(),
+        }),
         passes: found.passes,
         gaps: found.gaps,
         without_elements: known.without,
