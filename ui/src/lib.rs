@@ -5,6 +5,7 @@
 //! what was clicked, dropped or held, and its owner decides.
 
 pub mod alarms;
+pub mod attitude;
 pub mod bands;
 mod chip;
 pub mod chunk_grid;
@@ -21,6 +22,8 @@ pub mod lane;
 pub mod level;
 pub mod map;
 pub mod map_base;
+pub mod mode_chart;
+pub mod picture;
 pub mod plan_track;
 pub mod plot;
 pub mod sky;

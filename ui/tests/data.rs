@@ -9,10 +9,13 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use jiff::{SignedDuration, Timestamp};
+use ui::attitude::{Attitude, Standpoint, attitude_ui};
 use ui::bands::{Band, bands_ui};
 use ui::chunk_grid::{Cell, ChunkGrid, chunk_grid_ui};
 use ui::command::{CardAction, Command, End, Lights, command_card_ui};
 use ui::inspector::{Field, Inspector, inspector_ui};
+use ui::mode_chart::{ModeChart, Transition, mode_chart_ui};
+use ui::picture::{Picture, picture_ui};
 use ui::plan_track::{Step, StepState, TrackCommand, plan_track_ui};
 use ui::plot::{Curve, Limit, Series, View, plot_ui};
 use ui::{Level, Mode};
@@ -385,4 +388,90 @@ fn bands_look_as_before() {
     picture("bands", [620.0, 180.0], true, |ui| {
         bands_ui(ui, &bands);
     });
+}
+
+#[test]
+fn attitude_looks_as_before() {
+    let known = Attitude {
+        body_to_reference: Some([0.8, 0.3, -0.35, 0.55]),
+        sun: Some([0.6, 0.7, 0.35]),
+        field: Some([-0.5, 0.6, 0.5]),
+        nadir: Some([-0.2, -0.6, -0.75]),
+        camera_body: [1.0, 0.0, 0.0],
+        antenna_body: [0.0, 0.0, -1.0],
+        is_eclipsed: false,
+    };
+    picture("attitude", [300.0, 320.0], true, |ui| {
+        attitude_ui(ui, &known, &mut Standpoint::default(), vec2(276.0, 296.0));
+    });
+    let unknown = Attitude { body_to_reference: None, field: None, is_eclipsed: true, ..known };
+    picture("attitude-unknown", [300.0, 320.0], false, |ui| {
+        attitude_ui(ui, &unknown, &mut Standpoint::default(), vec2(276.0, 296.0));
+    });
+}
+
+#[test]
+fn mode_chart_looks_as_before() {
+    let modes = ["Start", "Deploy", "Detumble", "Nominal", "Imaging", "Downlink", "Safe", "Low power"];
+    let ways = [
+        (0, 1, "separated"),
+        (1, 2, "deployed"),
+        (2, 3, "rates below 1 °/s"),
+        (3, 4, "TakeImage"),
+        (4, 3, "taken"),
+        (3, 5, "pass begins"),
+        (5, 3, "pass ends"),
+        (3, 6, "fault"),
+        (4, 6, "fault"),
+        (6, 3, "SetMode"),
+        (3, 7, "battery below 7.2 V"),
+        (7, 3, "battery above 7.6 V"),
+        (2, 6, "fault"),
+    ];
+    let transitions = ways.map(|(from, to, name)| Transition { from, to, name });
+    let chart = ModeChart {
+        modes: &modes,
+        transitions: &transitions,
+        current: Some(5),
+        since: Some(before(140.0)),
+        taken: &[(3, 5, before(140.0)), (4, 3, before(2_500.0)), (3, 4, before(2_530.0))],
+    };
+    let mut clicked = None;
+    picture("mode-chart", [720.0, 220.0], true, |ui| {
+        mode_chart_ui(ui, &chart, 196.0, now());
+    });
+    let mut harness = harness(Mode::Dark, [720.0, 220.0], |ui| {
+        clicked = mode_chart_ui(ui, &chart, 196.0, now()).or(clicked)
+    });
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Mode Downlink, current").is_some());
+    harness.get_by_label("Mode Safe").click();
+    harness.run_steps(2);
+    drop(harness);
+    assert_eq!(clicked, Some(6));
+}
+
+#[test]
+fn picture_grows_and_what_is_missing_is_hatched() {
+    let (width, height) = (320_usize, 240_usize);
+    let mut rgba = Vec::new();
+    for index in 0..width * height {
+        let (x, y) = (index % width, index / width);
+        let is_here = y < 120 || (y < 128 && x < 208);
+        let sea = [30 + (y / 4) as u8, 70 + (x / 8) as u8, 120, if is_here { 255 } else { 0 }];
+        rgba.extend(sea);
+    }
+    let mut shown = Picture::default();
+    shown.set_rgba([width, height], &rgba).expect("a picture");
+    picture("picture", [400.0, 300.0], true, |ui| {
+        // Each theme is drawn by a context of its own, so the pixels are handed over again.
+        shown = Picture::default();
+        shown.set_rgba([width, height], &rgba).expect("a picture");
+        picture_ui(ui, &mut shown, "7", vec2(376.0, 276.0));
+    });
+    let mut harness = harness(Mode::Dark, [400.0, 300.0], |ui| {
+        picture_ui(ui, &mut shown, "7", vec2(376.0, 276.0));
+    });
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Picture 7, 52 % there").is_some());
 }

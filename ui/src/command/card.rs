@@ -101,6 +101,7 @@ fn title(ui: &mut Ui, theme: &Theme, command: &Command<'_>, now: Timestamp, acti
                 let age = RichText::new(format::age(now.duration_since(at)))
                     .font(fonts::figures(theme::sizes().small));
                 ui.label(age.color(theme.dim)).on_hover_text(format::utc_ms(at));
+                ui.add_space(2.0 * theme::space());
             }
             ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                 let arguments = RichText::new(command.arguments).font(fonts::figures(theme::sizes().small));
