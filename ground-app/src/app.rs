@@ -81,8 +81,10 @@ impl App {
             egui::Panel::top("top").show(ui, |ui| bars::top(ui, &mut scene));
             egui::Panel::bottom("bottom").show(ui, |ui| bars::bottom(ui, &mut scene));
             let (place, mut tree) = (scene.desk.place(), scene.desk.take_tree());
-            egui::CentralPanel::no_frame().show(ui, |ui| tree.ui(&mut Docked { scene: &mut scene }, ui));
+            let shown =
+                egui::CentralPanel::no_frame().show(ui, |ui| tree.ui(&mut Docked { scene: &mut scene }, ui));
             scene.desk.put_tree(place, tree);
+            bars::old(&context, shown.response.rect, &scene);
         }
         if let Some(file) = &mut self.file {
             let is_urgent = std::mem::take(&mut self.desk.is_urgent);

@@ -10,7 +10,7 @@ mod server_clock;
 mod values;
 
 use std::collections::{BTreeMap, VecDeque};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use api::client::StreamItem;
 use api::{
@@ -25,6 +25,8 @@ pub use resource::Resource;
 pub use server_clock::{ClockDoubt, ServerClock};
 pub use values::{Point, VALUES_MAX, Values};
 
+/// The server says how it is at least once a second: after so long a silence something is wrong.
+const SILENCE: Duration = Duration::from_millis(2500);
 /// Events that are kept at hand.
 const EVENTS_MAX: usize = 2000;
 /// Frames that are kept at hand.
@@ -198,6 +200,22 @@ impl Model {
             }
             StreamMessage::Hello { .. } | StreamMessage::Subscribed { .. } | StreamMessage::Live { .. } => {
                 Vec::new()
+            }
+        }
+    }
+
+    /// How long what is shown has been old: the line is lost, or the server has been silent for too long. `None` while all
+    /// is well, and before anything came.
+    #[must_use]
+    pub fn old_for(&self, now: Instant) -> Option<Duration> {
+        let silent = self.clock.silent_for(now);
+        match self.connection {
+            Connection::Connecting => None,
+            Connection::Lost { since, .. } => {
+                Some(silent.unwrap_or_default().max(now.saturating_duration_since(since)))
+            }
+            Connection::CatchingUp { .. } | Connection::Live { .. } => {
+                silent.filter(|silent| *silent > SILENCE)
             }
         }
     }

@@ -13,6 +13,13 @@ impl Scene<'_> {
                 return Err("the server is away: nothing can be asked of it".to_owned());
             }
         }
+        if let Some(silent) = self.model.old_for(self.now) {
+            return Err(format!("no word from the server for {} s", silent.as_secs()));
+        }
+        if let Some(version) = self.model.version.value().filter(|version| version.api != api::API_VERSION) {
+            let ours = api::API_VERSION;
+            return Err(format!("the server speaks version {} of the API, this window {ours}", version.api));
+        }
         let Some(session) = self.model.session.value() else {
             return Err("the server has not said yet what you may do".to_owned());
         };
@@ -37,7 +44,7 @@ impl Scene<'_> {
 }
 
 /// A button that Enter does not press: by the mouse or the space bar only. Greyed with its reason where `may` says no.
-pub(crate) fn button(ui: &mut egui::Ui, text: &str, may: &Result<(), String>) -> bool {
+pub(crate) fn button(ui: &mut egui::Ui, text: impl Into<egui::WidgetText>, may: &Result<(), String>) -> bool {
     let response = ui.add_enabled(may.is_ok(), egui::Button::new(text));
     let by_enter = ui.input(|input| input.key_pressed(egui::Key::Enter));
     let clicked = response.clicked() && !by_enter;

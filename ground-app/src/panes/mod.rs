@@ -15,7 +15,7 @@ mod gallery;
 mod history;
 mod log;
 mod map;
-mod may;
+pub(crate) mod may;
 mod notes;
 mod pass_curves;
 mod pass_plan;
@@ -221,6 +221,8 @@ pub fn open_draft(scene: &mut Scene<'_>, draft: crate::desk::Draft) {
 pub struct Kept {
     /// What is live is held still: lists and plots stay as they are. Nothing is lost by it.
     pub paused: bool,
+    /// The name that is typed for a layout.
+    pub(crate) layout_name: String,
     /// The frame that was chosen: the frame pane shows it.
     pub chosen_frame: Option<u64>,
     /// A pane that is to be brought to the front.

@@ -1,10 +1,11 @@
 //! The frame of the window: line, layouts, theme, palette, keys.
 
 use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
 use ground_app::desk::Layout;
 use ground_app::panes::Pane;
 
-use crate::common::Seat;
+use crate::common::{Seat, SeatOptions};
 
 #[test]
 fn it_connects_and_keys_show_layouts_theme_palette_and_the_list_of_keys() {
@@ -45,6 +46,22 @@ fn it_connects_and_keys_show_layouts_theme_palette_and_the_list_of_keys() {
 
     seat.press(Key::A);
     assert!(shown(&seat).contains(&Pane::Alarms));
+}
+
+#[test]
+fn the_bars_tell_what_must_never_be_out_of_sight_at_any_width() {
+    for size in [[1280.0, 800.0], [800.0, 600.0], [3840.0, 2160.0]] {
+        let mut seat = Seat::take_with(SeatOptions { size, draws: true, ..SeatOptions::default() });
+        seat.until_in_pass();
+        for part in
+            ["UTC clock", "LOS −", "Transmitter ", "0 severe", "Cease transmission", "SIMULATED", "local"]
+        {
+            assert!(seat.shows(part), "{part} at {size:?}: {:?}", seat.labels());
+        }
+        let button = seat.harness.get_by_label("Cease transmission").rect();
+        assert!(button.right() <= size[0] && button.bottom() <= 160.0, "{button:?} at {size:?}");
+        seat.picture(&format!("bars-{}", size[0]));
+    }
 }
 
 fn shown(seat: &Seat) -> Vec<Pane> {

@@ -98,7 +98,7 @@ impl Seat {
             .with_max_steps(40)
             .with_context_setup(|context| ui::install(context, ui::Mode::Dark));
         let builder = if options.draws { builder.wgpu() } else { builder };
-        let harness = builder.build_ui_state(|ui, app: &mut App| app.show(ui), app);
+        let harness = builder.build_eframe(|_| app);
         Self { harness, embedded: None, woken, folder: None }
     }
 
