@@ -77,7 +77,7 @@ impl Palette {
             self.open = false;
             return None;
         }
-        let mut found = find(entries(scene), &self.typed);
+        let mut found = find(entries(scene, &self.typed), &self.typed);
         let count = found.len().min(SHOWN);
         self.at = self.at.min(count.saturating_sub(1));
         if up {
@@ -142,8 +142,8 @@ fn row(ui: &mut egui::Ui, entry: &Entry, is_at: bool) -> bool {
 }
 
 /// All that can be chosen now.
-fn entries(scene: &Scene<'_>) -> Vec<Entry> {
-    let mut all = panes::entries(scene);
+fn entries(scene: &Scene<'_>, typed: &str) -> Vec<Entry> {
+    let mut all = panes::entries(scene, typed);
     for layout in Layout::ALL {
         let key = keys::ALL.iter().find(|binding| binding.deed == Deed::Layout(layout));
         let says = format!("layout, key {}", key.map_or("", |binding| binding.written));

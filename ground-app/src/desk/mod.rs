@@ -43,6 +43,8 @@ pub struct Desk {
     pub sound: bool,
     /// What is prepared to be sent.
     pub commands: CommandDesk,
+    /// Where reports are saved; empty: at home.
+    pub report_folder: String,
     /// What must be on the disk before the next frame: an idempotency key before it is used.
     #[serde(skip)]
     pub is_urgent: bool,
@@ -65,6 +67,7 @@ impl Default for Desk {
             satellite: None,
             sound: false,
             commands: CommandDesk::default(),
+            report_folder: String::new(),
             is_urgent: false,
             plots: PlotsDesk::default(),
             plans: PlanDesk::default(),

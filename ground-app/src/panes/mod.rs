@@ -194,9 +194,9 @@ impl Scene<'_> {
     }
 }
 
-/// What panes offer in the palette. Each opens, chooses or fills in; none may send anything by itself.
-pub(crate) fn entries(_scene: &Scene<'_>) -> Vec<Entry> {
-    Vec::new()
+/// What panes offer in the palette for what was typed. Each opens, chooses or fills in; none may send anything by itself.
+pub(crate) fn entries(_scene: &Scene<'_>, typed: &str) -> Vec<Entry> {
+    commands::entries(typed)
 }
 
 /// What goes on whether or not its pane is on the screen. Once a frame, before anything is drawn.

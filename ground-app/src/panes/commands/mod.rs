@@ -8,10 +8,13 @@ mod queue;
 mod send;
 mod stacks;
 
+use api::telecommand::{DEFINITIONS, Definition};
 use egui::{ScrollArea, Ui};
 use serde_json::{Map, Value};
 
 use super::{Scene, may};
+use crate::desk::Draft;
+use crate::palette::Entry;
 
 /// What this pane keeps between frames.
 #[derive(Default)]
@@ -91,9 +94,26 @@ pub(super) fn cease(scene: &mut Scene<'_>) {
 }
 
 /// Opens a draft in the sender. Sends nothing.
-pub(super) fn open(scene: &mut Scene<'_>, draft: crate::desk::Draft) {
+pub(super) fn open(scene: &mut Scene<'_>, draft: Draft) {
     scene.desk.commands.open(draft);
     scene.kept.commands.tab = Tab::Send;
+}
+
+/// Each command as an entry of the palette: it opens the form, filled with the words behind the name.
+pub(super) fn entries(typed: &str) -> Vec<Entry> {
+    let mut words = typed.split_whitespace();
+    let name = words.next().unwrap_or("").to_lowercase();
+    let words: Vec<String> = words.map(ToOwned::to_owned).collect();
+    let entry = |definition: &'static Definition| {
+        let is_named = !words.is_empty() && definition.name.to_lowercase().starts_with(&name);
+        let words = if is_named { words.clone() } else { Vec::new() };
+        let title = [vec![definition.name.to_owned()], words.clone()].concat().join(" ");
+        Entry::call(title, "command: opens its form", move |scene| {
+            let draft = Draft::with_words(definition.name, words.iter().map(String::as_str));
+            super::open_draft(scene, draft);
+        })
+    };
+    DEFINITIONS.iter().map(entry).collect()
 }
 
 /// Arguments on one line, as people write them.
