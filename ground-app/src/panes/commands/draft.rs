@@ -265,7 +265,7 @@ fn fire(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
     let mut go = false;
     if !is_critical {
         ui.horizontal(|ui| {
-            go = may::button(ui, &format!("Send {name}"), &can);
+            go = may::button(ui, format!("Send {name}"), &can);
             why(ui, &can);
         });
     } else if let Some((_, until)) = state.armed {
@@ -286,7 +286,7 @@ fn fire(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
         }
     } else {
         ui.horizontal(|ui| {
-            if may::button(ui, &format!("Arm {name}"), &can) {
+            if may::button(ui, format!("Arm {name}"), &can) {
                 state.armed = Some((draft.clone(), now + ARMED));
                 (state.hold, state.typed) = (Hold::default(), TypedWord::default());
             }

@@ -212,7 +212,7 @@ fn acts(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
         return;
     }
     let may_command = scene.may("command");
-    if may::button(ui, &format!("Withdraw {}", command.id), &may_command) {
+    if may::button(ui, format!("Withdraw {}", command.id), &may_command) {
         sender.cancel(scene, command.id, None);
     }
     let known = sender.sent.get(&command.id).cloned().filter(|request| request.confirm.is_none());
@@ -221,7 +221,7 @@ fn acts(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
         None => Err("only what was sent from this window, and is not critical, can be moved".to_owned()),
     };
     for (name, by) in [("Sooner", 1_i16), ("Later", -1)] {
-        if may::button(ui, &format!("{name} {}", command.id), &can)
+        if may::button(ui, format!("{name} {}", command.id), &can)
             && let Some(request) = &known
         {
             let priority = command.priority.saturating_add(by);
