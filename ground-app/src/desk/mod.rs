@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 pub use commands::{Asked, CommandDesk, Draft, Gate, KEPT_MAX, Stack, StackStep, Template};
 pub use layout::Layout;
-pub use plans::{PlanDesk, PlanDraft};
+pub use plans::{PlanDesk, PlanDraft, SlotDraft};
 pub use plots::{CURVES_MAX, PLOTS_MAX, PlotsDesk};
 pub use store::{DeskFile, DeskFileError};
 

@@ -14,6 +14,19 @@ pub struct PlanDesk {
     pub chosen: Option<String>,
     /// What was changed and not handed over.
     pub drafts: BTreeMap<String, PlanDraft>,
+    /// Blind downlinks being laid out, in order of time.
+    pub slots: Vec<SlotDraft>,
+}
+
+/// Chunks that the satellite is to send blind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SlotDraft {
+    /// From when, UTC in microseconds since 1970.
+    pub at_us: i64,
+    /// The first chunk.
+    pub first: u16,
+    /// How many, 1 to 64.
+    pub count: u16,
 }
 
 /// A plan being written.
