@@ -75,6 +75,7 @@ fn paint<B: DrawingBackend>(backend: B, columns: &[Column], from_us: i64, to_us:
     units.dedup();
     let mut chart = ChartBuilder::on(&area)
         .margin(24)
+        .margin_right(64)
         .caption(title, ("sans-serif", 26))
         .x_label_area_size(48)
         .y_label_area_size(96)

@@ -17,12 +17,12 @@ const ROWS_MAX: usize = 2_000_000;
 const PAGE: u32 = 10_000;
 
 const SCHEMA: &str = "message telemetry {
-    required int64 time (timestamp(micros, true));
-    required binary satellite (utf8);
-    required binary parameter (utf8);
-    required binary unit (utf8);
+    required int64 time (TIMESTAMP(MICROS,true));
+    required binary satellite (UTF8);
+    required binary parameter (UTF8);
+    required binary unit (UTF8);
     optional double value;
-    required int64 frame (integer(64, false));
+    required int64 frame (INTEGER(64,false));
 }";
 
 /// Values of one parameter, each as it was heard.

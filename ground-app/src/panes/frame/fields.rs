@@ -132,14 +132,16 @@ fn hex(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use protocol::{Downlink, FRAME_LEN, FrameForm, Heartbeat, encode_down};
+    use protocol::{Downlink, FRAME_LEN, FrameForm, encode_down};
     use ui::inspector::field_at;
+
+    const HEARTBEAT: usize = 117;
 
     use super::*;
 
     fn heartbeat(form: FrameForm) -> Vec<u8> {
         let payload: Vec<u8> =
-            (0..Heartbeat::LEN).map(|place| if place == 116 { 1 } else { place as u8 }).collect();
+            (0..HEARTBEAT).map(|place| if place == 116 { 1 } else { place as u8 }).collect();
         let packet = Downlink::decode(6, &payload).unwrap();
         let mut out = [0; FRAME_LEN];
         let length = encode_down(&packet, None, form, &mut out);
@@ -187,7 +189,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_named() {
-        let mut payload = vec![0; Heartbeat::LEN];
+        let mut payload = vec![0; HEARTBEAT];
         payload[..4].copy_from_slice(&f32::NAN.to_be_bytes());
         payload[4..8].copy_from_slice(&f32::INFINITY.to_be_bytes());
         let packet = Downlink::decode(6, &payload).unwrap();

@@ -124,6 +124,15 @@ impl Histories {
     }
 }
 
+#[cfg(test)]
+impl Histories {
+    /// As if the archive had said so.
+    pub(super) fn said(&mut self, page: &TelemetryPage, from_us: i64, model: &Model) {
+        let history = self.held.entry((page.satellite.clone(), page.parameter.clone())).or_default();
+        history.answers.push(Answer::new(Span { from_us, to_us: None }, page, &model.values));
+    }
+}
+
 impl History {
     fn settle(&mut self, model: &Model, satellite: &str, parameter: &str, now: Instant) {
         let Some((span, answer)) =

@@ -320,3 +320,104 @@ fn names(
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use api::{Sample, TelemetryPage, Time};
+
+    use super::*;
+    use crate::desk::Desk;
+    use crate::link::{Link, Server};
+    use crate::model::{Model, Point};
+    use crate::panes::Kept;
+
+    const POINTS: i64 = 100_000;
+    const STEP_US: i64 = 3_333;
+    /// Of 300 packets a second, those of one frame at 60 Hz.
+    const PACKETS: i64 = 5;
+
+    fn page(parameter: &str) -> TelemetryPage {
+        let sample = |i: i64| Sample {
+            at: Time::from_unix_us(i * STEP_US),
+            value: (i % 997 != 0).then(|| (i as f64 / 700.0).sin() * 20.0 + (i % 13) as f64 * 0.1),
+            frame: i as u64,
+        };
+        TelemetryPage {
+            parameter: parameter.to_owned(),
+            unit: "V".to_owned(),
+            satellite: "s".to_owned(),
+            start: None,
+            stop: None,
+            decimated: false,
+            samples: (0..POINTS).map(sample).collect(),
+            buckets: Vec::new(),
+        }
+    }
+
+    /// 20 plots of so many points and 300 packets a second, each frame of the window from its values to triangles.
+    #[test]
+    fn twenty_plots_of_many_points_take_what_comes() {
+        let server = Server { address: "http://127.0.0.1:9".to_owned(), token: None };
+        let link = Link::open(&server, Arc::new(|| {})).unwrap();
+        let mut model = Model::new(server.address);
+        let names: Vec<String> = (0..20).map(|number| format!("p.{number}")).collect();
+        let (mut kept, mut desk) = (Kept::default(), Desk::default());
+        desk.plots.plots = names.iter().map(|name| vec![name.clone()]).collect();
+        for name in &names {
+            kept.history.said(&page(name), 0, &model);
+        }
+        let context = egui::Context::default();
+        ui::install(&context, ui::Mode::Dark);
+        let mut state = State::default();
+        let mut view = View::following(SignedDuration::from_micros(POINTS * STEP_US), at(POINTS * STEP_US));
+        let mut took = Vec::new();
+        let mut packet = POINTS;
+        for _ in 0..240 {
+            let begun = crate::clock::instant();
+            for _ in 0..PACKETS {
+                packet += 1;
+                for name in &names {
+                    let value = Some((packet as f64 / 700.0).cos());
+                    let point = Point { at_us: packet * STEP_US, value, frame: packet as u64 };
+                    model.values.add("s", name, "V", point);
+                }
+            }
+            let now_us = packet * STEP_US;
+            let now = crate::clock::instant();
+            let mut scene = Scene {
+                model: &model,
+                desk: &mut desk,
+                courier: link.courier(),
+                kept: &mut kept,
+                now,
+                now_us: Some(now_us),
+            };
+            let input = egui::RawInput {
+                screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1600.0, 4400.0))),
+                ..egui::RawInput::default()
+            };
+            let mut output = context.run_ui(input, |ui| {
+                view.advance(at(now_us));
+                plots(ui, &mut scene, &mut state, &mut view, "s", now_us);
+            });
+            output.textures_delta.set.clear();
+            let shapes = std::mem::take(&mut output.shapes);
+            let triangles = context.tessellate(shapes, output.pixels_per_point);
+            assert!(!triangles.is_empty());
+            output.drop_without_applying_deltas();
+            took.push(crate::clock::instant().saturating_duration_since(begun));
+        }
+        let look = Look { satellite: "s", parameter: "p.7", from_us: 0, to_us: packet * STEP_US };
+        let series = kept.history.series(look).unwrap();
+        assert_eq!(series.len() as i64, POINTS + 240 * PACKETS, "each once");
+        took.drain(..20);
+        took.sort_unstable();
+        let at = |part: usize| took[(took.len() - 1) * part / 100];
+        println!("20 plots of {POINTS} points, 300 packets/s: p50 {:?}, p99 {:?}", at(50), at(99));
+        // Far above what a quiet machine takes: only what grows with the points would reach it.
+        assert!(at(50) < Duration::from_millis(400), "{:?}", at(50));
+    }
+}
