@@ -90,6 +90,6 @@ impl Heard {
             ..Said::new(Ear::TinygsApi, self.end_us.to_string())
         };
         let reception = Arc::new(admit(said, &Admission::at(now)).ok()?);
-        Some(Delivered { satellite: satellite.clone(), reception, known: None })
+        Some(Delivered { satellite: satellite.clone(), reception, known: Box::default() })
     }
 }

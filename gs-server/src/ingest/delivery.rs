@@ -131,7 +131,7 @@ impl Delivery {
 
     /// What the oldest part that is under way came to.
     async fn settle(&mut self) -> Result<Outcome, EarsError> {
-        let Some(UnderWay { receptions, mut answered, .. }) = self.under_way.pop_front() else {
+        let Some(UnderWay { mut receptions, mut answered, .. }) = self.under_way.pop_front() else {
             return Ok(Outcome::default());
         };
         let mut tries = self.patience;
@@ -142,6 +142,9 @@ impl Delivery {
                     tries -= 1;
                     let timer = self.ears.timer();
                     drop(timer.sleep_until(timer.now().mono.plus(AGAIN_US)).await);
+                    // What it was looked up for is some time ago.
+                    let reports = receptions.into_iter().map(|delivered| delivered.reception).collect();
+                    receptions = self.with_known(reports).await?;
                     answered = self.hand_over(&receptions).await;
                 }
                 Err(refusal) => {
@@ -166,8 +169,7 @@ impl Delivery {
         &self,
         receptions: Vec<Reception>,
     ) -> Result<(Vec<Delivered>, HashSet<Key>), StoreError> {
-        let store = self.ears.store();
-        let known = store.known_reports(&receptions.iter().collect::<Vec<_>>()).await?;
+        let known = self.ears.store().known_reports(&receptions.iter().collect::<Vec<_>>()).await?;
         let is_known = |report: &Reception| {
             let key = || (report.ear, report.source_id.clone(), report.receiver_id().to_owned());
             !known.is_empty() && known.contains(&key())
@@ -181,13 +183,18 @@ impl Delivery {
                 new.push(reception);
             }
         }
-        let frames =
-            store.known_frames(&self.satellite, &new.iter().map(Arc::as_ref).collect::<Vec<_>>()).await?;
-        let delivered = new.into_iter().zip(frames).map(|(reception, known)| Delivered {
+        Ok((self.with_known(new).await?, keys))
+    }
+
+    /// These reports with the frames of the archive that they may be of.
+    async fn with_known(&self, reports: Vec<Arc<Reception>>) -> Result<Vec<Delivered>, StoreError> {
+        let asked = reports.iter().map(Arc::as_ref).collect::<Vec<_>>();
+        let frames = self.ears.store().known_frames(&self.satellite, &asked).await?;
+        let delivered = reports.into_iter().zip(frames).map(|(reception, known)| Delivered {
             satellite: self.satellite.clone(),
             reception,
             known,
         });
-        Ok((delivered.collect(), keys))
+        Ok(delivered.collect())
     }
 }

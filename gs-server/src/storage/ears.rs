@@ -20,6 +20,8 @@ use super::{During, Page, Store, StoreError};
 const MANY: usize = 4_096;
 /// Frames with one checksum that are looked at; whoever makes more of them up meets no more.
 const SAME_CHECKSUM: i64 = 4_096;
+/// Of those so many for each report. They are half a window apart at least, or made up.
+const SAME_WINDOW: usize = 16;
 /// Frames that a restart remembers.
 const RECENT: i64 = 256;
 
@@ -273,7 +275,7 @@ impl Store {
         Ok(())
     }
 
-    /// The frames of the archive that these reports are of, in their order.
+    /// The frames of the archive that these reports may be of, in their order; of each the nearest in time first.
     ///
     /// # Errors
     /// [`StoreError`] when the database cannot be read.
@@ -281,36 +283,24 @@ impl Store {
         &self,
         satellite: &SatelliteId,
         reports: &[&Reception],
-    ) -> Result<Vec<Option<Known>>, StoreError> {
+    ) -> Result<Vec<Box<[Known]>>, StoreError> {
         let mut found = Vec::with_capacity(reports.len());
         for reports in reports.chunks(MANY) {
             let candidates = self.candidates(satellite, reports).await?;
-            found.extend(reports.iter().map(|report| {
-                let bytes = report.frame()?;
-                let mine = (report.received_at, report.is_dated());
-                let same = candidates.get(bytes)?.iter();
-                let same = same.filter(|(_, at, dated)| is_same_frame(bytes, (*at, *dated), mine));
-                // Of two as near the older, as the engine has it.
-                let nearest = same.min_by_key(|(id, at, _)| (at.0.abs_diff(mine.0.0), *id))?;
-                Some(Known {
-                    frame: FrameId(u64::try_from(nearest.0).ok()?),
-                    at: nearest.1,
-                    dated: nearest.2,
-                })
-            }));
+            found.extend(reports.iter().map(|report| nearest(report, &candidates)));
         }
         Ok(found)
     }
 
-    /// Frames with the bytes of these reports: number, time, and whether that is known.
+    /// Frames with the bytes of these reports.
     async fn candidates(
         &self,
         satellite: &SatelliteId,
         reports: &[&Reception],
-    ) -> Result<HashMap<Vec<u8>, Vec<(i64, UtcUs, bool)>>, StoreError> {
+    ) -> Result<Candidates, StoreError> {
         let checksums: HashSet<&[u8]> =
             reports.iter().filter_map(|report| report.frame()?.get(8..12)).collect();
-        let mut candidates: HashMap<Vec<u8>, Vec<(i64, UtcUs, bool)>> = HashMap::new();
+        let mut candidates = Candidates::new();
         if checksums.is_empty() {
             return Ok(candidates);
         }
@@ -325,16 +315,35 @@ impl Store {
         values.push(SAME_CHECKSUM.max(checksums.len() as i64 * 4).into());
         let statement = grouped(head, (1, columns), " order by id desc limit ?", values);
         for row in &statement.fetch_all(&self.0.readers).await? {
-            let id = row.try_get("id")?;
+            let id: i64 = row.try_get("id")?;
             let mut at = UtcUs(row.try_get("heard_at_us")?);
             let mut dated = row.try_get::<i64>("dated")? == 1;
             if !dated && let Some(told_us) = told_us(id, &self.0.readers).await? {
                 (at, dated) = (UtcUs(told_us), true);
             }
-            candidates.entry(row.try_get("bytes")?).or_default().push((id, at, dated));
+            candidates.entry(row.try_get("bytes")?).or_default().push(Known {
+                frame: FrameId(narrow("frames.id", id)?),
+                at,
+                dated,
+            });
         }
         Ok(candidates)
     }
+}
+
+/// Frames by their bytes.
+type Candidates = HashMap<Vec<u8>, Vec<Known>>;
+
+/// Those that the report may be of, the nearest first, of two as near the older, as the engine has it.
+fn nearest(report: &Reception, candidates: &Candidates) -> Box<[Known]> {
+    let Some(bytes) = report.frame() else { return Box::default() };
+    let mine = (report.received_at, report.is_dated());
+    let same = candidates.get(bytes).into_iter().flatten();
+    let same = same.filter(|known| is_same_frame(bytes, (known.at, known.dated), mine));
+    let mut same: Vec<Known> = same.copied().collect();
+    same.sort_unstable_by_key(|known| (known.at.0.abs_diff(mine.0.0), known.frame.0));
+    same.truncate(SAME_WINDOW);
+    same.into()
 }
 
 /// Reports with their numbers.

@@ -271,8 +271,9 @@ pub struct Delivered {
     pub satellite: SatelliteId,
     /// What was heard.
     pub reception: Arc<Reception>,
-    /// The frame of the archive that has these bytes in this window of time, if it has one.
-    pub known: Option<Known>,
+    /// The frames of the archive that may be this one: these bytes, in this window of time. All of them, since the engine
+    /// may know better of one by then: what was given to it before may have told when that one was heard.
+    pub known: Box<[Known]>,
 }
 
 /// A frame that the archive has.

@@ -66,9 +66,11 @@ impl Station {
             at: recent.at,
             dated: recent.dated,
         });
-        // Of a frame that is remembered memory knows more than the archive said when it was asked, a batch ago.
+        // Of a frame that is remembered memory knows more than the archive said when it was asked, a batch ago: that one
+        // does not count, and the others do. So it does not matter how much of what came before was stored by then.
         let near = |known: &Known| nearness(known.at, at.0, known.frame);
-        let archived = delivered.known.filter(|known| !self.recent.holds(s, frame.bytes(), known.frame));
+        let is_news = |known: &Known| !self.recent.holds(s, frame.bytes(), known.frame);
+        let archived = delivered.known.iter().copied().filter(is_news);
         match remembered.into_iter().chain(archived).min_by_key(near) {
             Some(known) => {
                 taken.merged += 1;

@@ -20,7 +20,7 @@ pub(crate) fn report(world: &World, id: &str, bytes: &[u8], at: Option<UtcUs>) -
         ..Said::new(Ear::TinygsApi, id.to_owned())
     };
     let reception = admit(said, &Admission::at(world.now.utc)).unwrap();
-    Delivered { satellite: world.satellite.clone(), reception: Arc::new(reception), known: None }
+    Delivered { satellite: world.satellite.clone(), reception: Arc::new(reception), known: Box::default() }
 }
 
 impl World {
@@ -120,12 +120,34 @@ fn what_the_archive_knows_is_believed_of_it() {
     let mut world = World::in_contact();
     let known = Known { frame: FrameId(1), at: world.now.utc, dated: true };
     let delivered = Delivered {
-        known: Some(known),
+        known: Box::new([known]),
         ..report(&world, "k", &heartbeat_frame(0, 1, 1), Some(UtcUs(1_600_000_000_000_000)))
     };
     let values = world.values();
     assert_eq!(world.deliver(&[delivered]), MERGED);
     assert_eq!((world.reports(), world.values()), (vec![Some(FrameId(1))], values));
+}
+
+/// The archive was asked before the report was stored that told when one of its frames was heard.
+#[test]
+fn what_the_archive_knew_of_one_frame_a_moment_ago_hides_no_other() {
+    let mut world = World::in_contact();
+    world.pass(3_600 * S);
+    let (pong, now) = (frame(0, 0, &[]), world.now.utc);
+    let after = |seconds: i64| now.plus(seconds * 1_000_000);
+    let undated = report(&world, "u", &pong, None);
+    assert_eq!(world.deliver(&[undated]), NEW);
+    let moved = world.reports()[0].unwrap();
+    assert_eq!(world.told(&pong, after(20)), MERGED);
+    let stays = Known { frame: FrameId(77_777), at: after(-40), dated: true };
+    let stored = Known { frame: moved, at: after(20), dated: true };
+    let before = Known { at: now, dated: false, ..stored };
+    for known in [vec![before, stays], vec![stays]] {
+        let id = format!("of {}", known.len());
+        let late = Delivered { known: known.into(), ..report(&world, &id, &pong, Some(after(-19))) };
+        assert_eq!(world.deliver(&[late]), MERGED);
+        assert_eq!(world.reports().last(), Some(&Some(stays.frame)), "{id}");
+    }
 }
 
 #[test]
