@@ -16,7 +16,8 @@ fn a_server_that_dies_in_a_pass_is_missed() {
     let said_after = ground_app::clock::instant().duration_since(gone);
     assert!(said_after <= NOTICED_WITHIN, "{said_after:?}");
     assert!(matches!(seat.model().connection, Connection::Lost { .. }));
-    assert!(seat.has("Transmitter TX –"), "what it does now nobody knows: {:?}", seat.labels());
+    let unknown = format!("Transmitter {}", ui::lamps::Transmitter::Unknown.word());
+    assert!(seat.has(&unknown), "what it does now nobody knows: {:?}", seat.labels());
     seat.picture("lost");
 }
 
