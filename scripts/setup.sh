@@ -2,7 +2,7 @@
 # Installs what a clean Debian or Ubuntu machine lacks, and nothing that is there already.
 #
 #   scripts/setup.sh compiler                what scripts/demo needs
-#   scripts/setup.sh compiler python node tools package cargo-tools     what scripts/test needs (also: scripts/setup.sh all)
+#   scripts/setup.sh compiler python node tools pictures package cargo-tools     what scripts/test needs (also: scripts/setup.sh all)
 #
 # Rust is presupposed; everything else is named here, each package where it is needed.
 set -euo pipefail
@@ -100,6 +100,16 @@ tools() {
   { { have mosquitto || [ -x /usr/sbin/mosquitto ]; } && have mosquitto_pub; } || install_packages mosquitto mosquitto-clients
 }
 
+# Pictures of the desk's widgets are drawn without a display: by software Vulkan, or else by software OpenGL.
+pictures() {
+  have dpkg || return 0
+  local package missing=()
+  for package in mesa-vulkan-drivers libgl1-mesa-dri libegl1; do
+    dpkg -s "$package" >/dev/null 2>&1 || missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}"
+}
+
 # install_cargo_tool CRATE VERSION [OPTION...]: builds it when it is not in the path. Its artefacts stay out of our target folder.
 install_cargo_tool() {
   local crate=$1 version=$2
@@ -135,9 +145,10 @@ for need in "$@"; do
     python) python ;;
     node) javascript ;;
     tools) tools ;;
+    pictures) pictures ;;
     package) package ;;
     cargo-tools) cargo_tools ;;
-    all) compiler; python; javascript; tools; package; cargo_tools ;;
-    *) fail "unknown need '$need': compiler, python, node, tools, package, cargo-tools or all" ;;
+    all) compiler; python; javascript; tools; pictures; package; cargo_tools ;;
+    *) fail "unknown need '$need': compiler, python, node, tools, pictures, package, cargo-tools or all" ;;
   esac
 done

@@ -165,7 +165,7 @@ impl AlarmList {
         let mut x = rect.left();
         for (title, order, wide) in COLUMNS {
             // What has no width of its own stands at the right end, as the words below it do
-            let (left, wide) = if wide > 0.0 { (x, wide) } else { (rect.right() - 60.0, 60.0) };
+            let (left, wide) = if wide > 0.0 { (x, wide) } else { (rect.right() - 54.0, 54.0) };
             let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(wide, rect.height()));
             let response = ui.interact(cell, ui.scope_id().with(("alarm order", title)), Sense::click());
             if response.clicked() {

@@ -288,7 +288,7 @@ pub fn alarm_counts(ui: &mut Ui, counts: [usize; 5]) -> Option<Level> {
 /// Hatches what lies behind the top bar of a simulation: paint it first, then the bar over it.
 pub fn simulated_hatch(painter: &Painter, rect: Rect, theme: &Theme) {
     let painter = painter.with_clip_rect(painter.clip_rect().intersect(rect));
-    let stroke = Stroke::new(6.0, theme.line);
+    let stroke = Stroke::new(6.0, theme.line.gamma_multiply(0.6));
     let (step, height) = (18.0, rect.height());
     let mut x = rect.left() - height - step;
     while x < rect.right() + step {

@@ -97,7 +97,11 @@ impl SkyPlot<'_> {
         if ui.is_rect_visible(rect) {
             self.grid(&painter, &disk, theme, &mut labels);
             self.sun(&painter, &disk, theme, &mut labels);
+            if let Some(antenna) = self.antenna {
+                labels.keep_off(Rect::from_center_size(disk.at(antenna.direction), vec2(28.0, 28.0)));
+            }
             self.path(&painter, &disk, theme, rect, &mut labels);
+            Self::heights(&painter, &disk, theme, rect, &mut labels);
             self.antenna(&painter, &disk, theme);
             if let Some(here) = self.place_at(&disk, self.now) {
                 painter.circle_filled(here, 8.0, theme.accent.gamma_multiply(0.25));
@@ -147,10 +151,17 @@ impl SkyPlot<'_> {
             let colour = if name == "N" { theme.text } else { theme.dim };
             labels::fixed(labels, painter, at, Align2::CENTER_CENTER, name, fonts::body(), colour);
         }
+    }
+
+    /// How high the rings are, on the side where nothing lies.
+    fn heights(painter: &Painter, disk: &Disk, theme: &Theme, within: Rect, labels: &mut Labels) {
         for elevation_deg in [60.0_f32, 30.0, 0.0] {
             let text = format!("{elevation_deg}°");
-            let at = disk.centre + vec2(3.0, -disk.radius * (90.0 - elevation_deg) / 90.0 + 1.0);
-            labels::fixed(labels, painter, at, Align2::LEFT_TOP, &text, fonts::small(), theme.dim);
+            let size = labels::size(painter, &text, &fonts::small());
+            let ring = disk.radius * (90.0 - elevation_deg) / 90.0;
+            let (x, y) = (size.x / 2.0 + 3.0, ring - size.y / 2.0 - 1.0);
+            let places = [vec2(x, -y), vec2(x, y), vec2(-x, -y), vec2(-x, y)];
+            labels.write(painter, within, disk.centre, &places, &text, fonts::small(), theme.dim);
         }
     }
 

@@ -128,6 +128,10 @@ impl Timeline {
                     );
                 }
             });
+            if plate.is_some() {
+                let x = axis.x(seconds(now));
+                labels.keep_off(Rect::from_min_max(pos2(x - 1.0, row.top()), pos2(x + 1.0, row.bottom())));
+            }
             // Once all items of the row are there, so that no label lies on a later one
             for (item, (place, ink)) in named {
                 pen.label(item, place, ink, &mut labels);

@@ -3,6 +3,7 @@
 //! The pictures are for eyes: they are looked at when a widget changes. Without a display it draws by software Vulkan
 //! (scripts/setup.sh installs it).
 
+mod data;
 mod desk;
 mod earth;
 mod time;
@@ -27,6 +28,12 @@ const EXHIBITS: &[Exhibit] = &[
     ("values", [560.0, 240.0], desk::values),
     ("timeline-days", [1200.0, 220.0], time::days),
     ("timeline-pass", [1200.0, 220.0], time::one_pass),
+    ("plot", [760.0, 300.0], data::plot),
+    ("chunk-grid", [420.0, 200.0], data::chunk_grid),
+    ("commands", [440.0, 500.0], data::commands),
+    ("plan-track", [760.0, 200.0], data::plan_track),
+    ("inspector", [860.0, 240.0], data::inspector),
+    ("bands", [640.0, 140.0], data::bands),
     ("map-near", [1000.0, 520.0], earth::map_near),
 ];
 
