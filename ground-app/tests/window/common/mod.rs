@@ -66,13 +66,9 @@ impl Seat {
     pub(crate) fn take_with(options: SeatOptions) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let data = Some(folder.path().join("data"));
-        let embedded = Embedded::start(EmbeddedOptions {
-            data,
-            speed: options.speed,
-            operates: options.operates,
-            ..EmbeddedOptions::default()
-        })
-        .unwrap();
+        let embedded =
+            Embedded::start(EmbeddedOptions { data, speed: options.speed, operates: options.operates })
+                .unwrap();
         let server = embedded.server().clone();
         let mut seat = Self::at(&server, options);
         seat.embedded = Some(embedded);
