@@ -80,9 +80,9 @@ impl Client {
     /// One connection, until it breaks; `Ok` when we are to stop.
     async fn once(&self, stop: &CancellationToken) -> Result<(), NoConnection> {
         let connecting = connect(&self.section, &self.client_id);
-        let (mut wire, mut early) = tokio::select! {
+        let mut wire = tokio::select! {
             () = stop.cancelled() => return Ok(()),
-            connected = connecting => connected?,
+            wire = connecting => wire?,
         };
         self.way.count("connections");
         self.way.works();
@@ -91,9 +91,6 @@ impl Client {
         let mut ping_at = self.machine.now().mono.plus(period_us);
         let mut heard = self.machine.now().mono;
         let mut words = Words::default();
-        while let Some(came) = early.pop_front() {
-            self.take(came, &mut wire, &mut words).await.map_err(broke)?;
-        }
         loop {
             let came = tokio::select! {
                 () = stop.cancelled() => {

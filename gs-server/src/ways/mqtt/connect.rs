@@ -1,6 +1,5 @@
 //! A connection to somebody's broker: TCP, TLS where the address says so, CONNECT and SUBSCRIBE.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -27,8 +26,6 @@ use crate::ways::secret;
 const PATIENCE: Duration = Duration::from_secs(15);
 /// Seconds without a word after which the broker takes us for gone.
 pub(super) const KEEP_ALIVE_S: u16 = 30;
-/// Messages that may come before the answer to SUBSCRIBE; a broker has far fewer under way.
-const EARLY_MOST: usize = 256;
 /// What boards publish.
 const ALL_OF_BOARDS: [&str; 2] = ["tinygs/+/+/tele/+", "tinygs/+/+/stat/+"];
 
@@ -43,11 +40,8 @@ pub(super) enum NoConnection {
 
 use NoConnection::{Failed, Refused};
 
-/// A connection, and what came over it before the broker had answered: it sends at once what it kept for us.
-pub(super) type Connected = (Wire, VecDeque<Came>);
-
 /// A broker that sends us what boards publish.
-pub(super) async fn connect(section: &EarSection, client_id: &str) -> Result<Connected, NoConnection> {
+pub(super) async fn connect(section: &EarSection, client_id: &str) -> Result<Wire, NoConnection> {
     let url = Url::parse(section.url()).map_err(|error| Failed(error.to_string()))?;
     let is_secure = url.scheme() == "mqtts";
     let host = url.host_str().unwrap_or_default().trim_matches(['[', ']']).to_owned();
@@ -64,14 +58,11 @@ pub(super) async fn connect(section: &EarSection, client_id: &str) -> Result<Con
     let mut wire = wire(stream, MESSAGE_MAX, CONNACK);
     let mut hello = Connect::new(client_id);
     hello.keep_alive = KEEP_ALIVE_S;
-    // The broker keeps for us what comes while we are away, and sends again what we did not take.
-    hello.clean_session = false;
     if let (Some(user), Some(file)) = (&section.user, &section.password_file) {
         let password = secret::load(file).await.map_err(Failed)?;
         hello.set_login(user.as_str(), password.as_str());
     }
-    let mut early = VecDeque::new();
-    match ask(&mut wire, &mut early, Packet::Connect(hello)).await? {
+    match ask(&mut wire, Packet::Connect(hello)).await? {
         Packet::ConnAck(answer) => match answer.code {
             ConnectReturnCode::Success => {}
             ConnectReturnCode::ServiceUnavailable => {
@@ -90,13 +81,13 @@ pub(super) async fn connect(section: &EarSection, client_id: &str) -> Result<Con
     let filters = topics.iter().map(|topic| SubscribeFilter::new(topic.clone(), QoS::AtLeastOnce));
     let mut subscribe = Subscribe::new_many(filters);
     subscribe.pkid = 1;
-    match ask(&mut wire, &mut early, Packet::Subscribe(subscribe)).await? {
+    match ask(&mut wire, Packet::Subscribe(subscribe)).await? {
         Packet::SubAck(answer) => {
             let refused = topics.iter().zip(&answer.return_codes);
             let refused = refused.filter(|(_, code)| **code == SubscribeReasonCode::Failure);
             let refused: Vec<&str> = refused.map(|(topic, _)| topic.as_str()).collect();
             if refused.is_empty() {
-                return Ok((wire, early));
+                return Ok(wire);
             }
             Err(Refused(format!(
                 "the broker does not let us read {}: give user the right to, or change topics",
@@ -115,23 +106,13 @@ async fn step<T>(what: &str, work: impl Future<Output = std::io::Result<T>>) -> 
     }
 }
 
-/// Sends a packet and waits for the answer; messages that come first are kept.
-async fn ask(wire: &mut Wire, early: &mut VecDeque<Came>, packet: Packet) -> Result<Packet, NoConnection> {
+/// Sends a packet and waits for the answer.
+async fn ask(wire: &mut Wire, packet: Packet) -> Result<Packet, NoConnection> {
     let talk = async {
         wire.send(packet).await.map_err(|error| Failed(error.to_string()))?;
         loop {
             return match wire.next().await {
-                Some(Ok(Came::Packet(Packet::Publish(_) | Packet::PubRel(_)) | Came::TooLong { .. }))
-                    if early.len() >= EARLY_MOST =>
-                {
-                    Err(Failed("the broker sends messages and no answer".into()))
-                }
-                Some(Ok(
-                    came @ (Came::Packet(Packet::Publish(_) | Packet::PubRel(_)) | Came::TooLong { .. }),
-                )) => {
-                    early.push_back(came);
-                    continue;
-                }
+                Some(Ok(Came::Packet(Packet::Publish(_)) | Came::TooLong { .. })) => continue,
                 Some(Ok(Came::Packet(packet))) => Ok(packet),
                 Some(Err(error)) => Err(Failed(error.to_string())),
                 None => {

@@ -94,21 +94,6 @@ async fn a_broker_that_goes_and_comes_back_is_found_again() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_broker_keeps_for_us_what_comes_while_we_are_away() {
-    let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
-    let _broker = mosquitto(folder.path(), port, "allow_anonymous true").await;
-    let home = Home::new(&ear(port, ""));
-    let bench = home.serve(START).await;
-    bench.way("club", |way| way["state"] == "working").await;
-    bench.stop().await;
-    let message = rx(&heartbeat(1_000), START.0);
-    assert!(publish(port, &format!("{TOPIC}rx"), &message, &["-q", "1"]).await);
-    let bench = home.serve(START).await;
-    bench.until_heard((1, 0, 1)).await;
-    bench.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_broker_that_refuses_is_told_to_people_and_not_hammered() {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let passwords = folder.path().join("passwords");
