@@ -78,8 +78,6 @@ pub struct SatelliteSnapshot {
     pub commands: Vec<CommandSnapshot>,
     /// The newest image with the chunks that are held (first versions, not conflicts).
     pub image: Option<ImageSnapshot>,
-    /// Images before that, the newest first, without a gap among them: as many as [`fits_older`] says.
-    pub older_images: Vec<ImageSnapshot>,
     /// Downloads that are active.
     pub downloads: Vec<DownloadRecord>,
     /// Limits that are not normal.
@@ -120,18 +118,6 @@ pub struct SealedSnapshot {
     pub tag: RequestTag,
     /// The 240 bytes.
     pub bytes: Arc<[u8; 240]>,
-}
-
-/// How many of these images, the newest first by their numbers of chunks, a satellite keeps in memory besides its newest:
-/// eight, of 8 MiB together.
-pub fn fits_older(chunks: impl IntoIterator<Item = u32>) -> usize {
-    const MOST: usize = 8;
-    const BYTES: u64 = 8 << 20;
-    let sums = chunks.into_iter().take(MOST).scan(0_u64, |sum, chunks| {
-        *sum += u64::from(chunks) * protocol::CHUNK_LEN as u64;
-        Some(*sum)
-    });
-    sums.take_while(|bytes| *bytes <= BYTES).count()
 }
 
 /// An image and the chunks of it that are held.

@@ -38,7 +38,6 @@ mod intake;
 mod intents;
 mod journal;
 mod link;
-mod older;
 mod outcome;
 mod outside;
 mod packets;

@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use mission::plan::RunEnd;
 use mission::record::{
-    ChunkRecord, CommandRecord, DownloadRecord, DownloadState, ImageRecord, LimitRecord, PassRecord, Record,
-    SealedRecord,
+    CommandRecord, DownloadRecord, DownloadState, ImageRecord, LimitRecord, PassRecord, Record, SealedRecord,
 };
 use mission::run::{PlanRecord, RunRecord, RunState};
 use mission::snapshot::{
@@ -18,9 +17,6 @@ use mission::{
     UtcUs,
 };
 use protocol::{Counter, Downlink, KeyId, RequestTag};
-
-/// Chunks that are held, by index.
-type HeldChunks = BTreeMap<u16, Box<[u8; 222]>>;
 
 /// A command with its last stage.
 #[derive(Debug, Clone)]
@@ -43,11 +39,9 @@ pub(crate) struct Store {
     last_tag: Option<RequestTag>,
     last_ids: LastIds,
     images: BTreeMap<ImageId, ImageRecord>,
-    chunks: HeldChunks,
+    chunks: BTreeMap<u16, Box<[u8; 222]>>,
     conflicts: Vec<u16>,
     current_image: Option<ImageId>,
-    /// Images before that, the newest first, with what is held of them.
-    older_images: Vec<(ImageId, HeldChunks, Vec<u16>)>,
     downloads: BTreeMap<DownloadId, DownloadRecord>,
     limits: BTreeMap<String, LimitRecord>,
     heartbeat: Option<(FrameId, UtcUs, u32)>,
@@ -137,14 +131,15 @@ impl Store {
             Record::CounterFloor(floor) => self.counter = self.counter.max(Some(floor.counter)),
             Record::Image(image) => {
                 self.last_ids.image = self.last_ids.image.max(image.id.0);
-                if self.current_image < Some(image.id) {
-                    self.begin_image(image.id);
+                if self.current_image != Some(image.id) {
+                    self.current_image = Some(image.id);
+                    self.chunks.clear();
+                    self.conflicts.clear();
                 }
                 let before = self.images.insert(image.id, image.clone());
                 let was_complete = before.is_some_and(|image| image.completed_at.is_some());
                 self.images_complete += u64::from(image.completed_at.is_some() && !was_complete);
             }
-            Record::Chunk(chunk) if self.current_image != Some(chunk.image) => self.late_chunk(chunk)?,
             Record::Chunk(chunk) if chunk.conflict => self.conflicts.push(chunk.index),
             Record::Chunk(chunk) => {
                 if self.chunks.insert(chunk.index, chunk.data.clone()).is_some() {
@@ -188,36 +183,6 @@ impl Store {
         Ok(())
     }
 
-    fn begin_image(&mut self, id: ImageId) {
-        let (chunks, conflicts) = (std::mem::take(&mut self.chunks), std::mem::take(&mut self.conflicts));
-        if let Some(before) = self.current_image.replace(id) {
-            self.older_images.insert(0, (before, chunks, conflicts));
-        }
-    }
-
-    /// A chunk of an image that is the newest no more.
-    fn late_chunk(&mut self, chunk: &ChunkRecord) -> Result<(), String> {
-        let found = self.older_images.iter_mut().find(|(id, ..)| *id == chunk.image);
-        let (_, chunks, conflicts) = found.ok_or_else(|| format!("a chunk of no image, {}", chunk.image))?;
-        if chunk.conflict {
-            conflicts.push(chunk.index);
-        } else if chunks.insert(chunk.index, chunk.data.clone()).is_some() {
-            return Err(format!("chunk {} of image {} replaced", chunk.index, chunk.image));
-        }
-        Ok(())
-    }
-
-    fn older_snapshots(&self) -> Vec<ImageSnapshot> {
-        let of = |(id, chunks, conflicts): &(ImageId, HeldChunks, Vec<u16>)| {
-            Some(ImageSnapshot {
-                record: self.images.get(id)?.clone(),
-                chunks: chunks.iter().map(|(index, data)| (*index, data.clone())).collect(),
-                conflicts: conflicts.clone(),
-            })
-        };
-        self.older_images.iter().filter_map(of).collect()
-    }
-
     /// What a restart begins from; without a key the satellite is only heard.
     pub(crate) fn snapshot(&self, satellite: &SatelliteId, key: Option<KeyId>) -> Snapshot {
         let open = |c: &&StoredCommand| !c.stage.is_final() || c.stage == Stage::Unknown;
@@ -242,7 +207,6 @@ impl Store {
                 last_tag: self.last_tag,
                 commands: commands.collect(),
                 image,
-                older_images: self.older_snapshots(),
                 downloads: self.downloads.values().filter(active).cloned().collect(),
                 limits: self.limits.values().cloned().collect(),
                 heartbeat: self.heartbeat,

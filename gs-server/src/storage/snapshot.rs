@@ -7,7 +7,7 @@ use mission::run::{PlanRecord, RunRecord};
 use mission::sky::SETS_KEPT;
 use mission::snapshot::{
     CommandSnapshot, ImageSnapshot, KeySnapshot, LastIds, SatelliteSnapshot, SealedSnapshot, Snapshot,
-    Witness, fits_older,
+    Witness,
 };
 use mission::{ElementSet, FrameId, SatelliteId, Stage, UtcUs};
 use protocol::{Counter, DownFrame, Downlink, KeyId, RequestTag, down_type};
@@ -69,9 +69,6 @@ pub(super) async fn snapshot(
     }
     Ok(snapshot)
 }
-
-/// Images that are looked at: the newest, and as many before it as [`fits_older`] ever keeps.
-const NEWEST_IMAGES: i64 = 9;
 
 fn is_empty(left: &SatelliteSnapshot) -> bool {
     left.last_tag.is_none()
@@ -153,13 +150,11 @@ async fn of_satellite(
     satellite: &SatelliteId,
     own: Own,
 ) -> Result<SatelliteSnapshot, StoreError> {
-    let mut images = images(connection, satellite, own).await?.into_iter();
     Ok(SatelliteSnapshot {
         satellite: satellite.clone(),
         last_tag: last_tag(connection, satellite).await?,
         commands: commands(connection, satellite, own).await?,
-        image: images.next(),
-        older_images: images.collect(),
+        image: image(connection, satellite, own).await?,
         downloads: {
             let rows = sql(select::<DownloadRow>(
                 "where satellite = ? and state = 'active' and id > ? and id < ? order by id",
@@ -336,49 +331,37 @@ fn sealed_snapshot(row: &SealedRow) -> Result<SealedSnapshot, StoreError> {
     })
 }
 
-/// The newest image and those before it that are kept, with the first version of each chunk that is held.
-async fn images(
+/// The newest image and the first version of each chunk that is held.
+async fn image(
     connection: &mut Reading,
     satellite: &SatelliteId,
     own: Own,
-) -> Result<Vec<ImageSnapshot>, StoreError> {
-    let rows = sql(select::<ImageRow>("where satellite = ? and id > ? and id < ? order by id desc limit ?"))
+) -> Result<Option<ImageSnapshot>, StoreError> {
+    let found = sql(select::<ImageRow>("where satellite = ? and id > ? and id < ? order by id desc limit 1"))
         .bind(satellite.as_str())
         .bind(own.after)
         .bind(own.before)
-        .bind(NEWEST_IMAGES)
-        .fetch_all(&mut *connection)
+        .fetch_optional(&mut *connection)
         .await?;
-    let found = rows.iter().map(ImageRow::read).collect::<Result<Vec<_>, _>>()?;
-    let mut images = Vec::new();
-    for found in &found {
-        images.push(ImageSnapshot { record: found.record()?, chunks: Vec::new(), conflicts: Vec::new() });
-    }
-    let older = fits_older(images.iter().skip(1).map(|image| image.record.chunks));
-    images.truncate(1 + older);
-    for (image, row) in images.iter_mut().zip(&found) {
-        chunks(connection, row.id, image).await?;
-    }
-    Ok(images)
-}
-
-async fn chunks(connection: &mut Reading, id: i64, image: &mut ImageSnapshot) -> Result<(), StoreError> {
+    let Some(found) = found else { return Ok(None) };
+    let image = ImageRow::read(&found)?;
     let rows = sql(select::<ChunkRow>("where image = ? order by chunk_index, id"))
-        .bind(id)
+        .bind(image.id)
         .fetch_all(&mut *connection)
         .await?;
+    let mut snapshot = ImageSnapshot { record: image.record()?, chunks: Vec::new(), conflicts: Vec::new() };
     for row in &rows {
         let row = ChunkRow::read(row)?;
         let index = narrow("chunks.chunk_index", row.chunk_index)?;
         if row.conflict {
-            if image.conflicts.last() != Some(&index) {
-                image.conflicts.push(index);
+            if snapshot.conflicts.last() != Some(&index) {
+                snapshot.conflicts.push(index);
             }
         } else {
-            image.chunks.push((index, Box::new(exactly("chunks.data", &row.data)?)));
+            snapshot.chunks.push((index, Box::new(exactly("chunks.data", &row.data)?)));
         }
     }
-    Ok(())
+    Ok(Some(snapshot))
 }
 
 /// The newest heartbeat that makes sense: frame, when heard, uptime in ms.

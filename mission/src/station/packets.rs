@@ -278,9 +278,7 @@ impl Station {
                 "image {} declared: {} x {}, {} bytes in {} chunks",
                 record.id, record.width_px, record.height_px, record.size_bytes, record.chunks
             );
-            if let Some(before) = sat.image.replace(Assembly::new(record.clone())) {
-                sat.older.push(before);
-            }
+            sat.image = Some(Assembly::new(record.clone()));
             self.journal.push(Record::Image(record.clone()));
             let subject = Subject { frame: Some(heard.id), image: Some(record.id), ..Subject::default() };
             let about = About { route: Some(heard.route.clone()), subject, ..About::default() };
@@ -291,23 +289,17 @@ impl Station {
 
     fn image_chunk(&mut self, heard: &Heard, s: usize, chunk: &ImageChunk) {
         let index = chunk.index.0;
-        let sat = &mut self.satellites[s];
-        let Some(newest) = &sat.image else {
+        let Some(image) = &mut self.satellites[s].image else {
             let message = format!("chunk {index} of an image that nobody has declared: kept raw");
             self.kept_raw(heard, EventKind::ChunkReceived, Level::Watch, message);
             return;
         };
-        let newest_id = newest.record.id;
-        // What was heard before the newest was declared is of the one that was the newest then.
-        let is_older = !heard.live && heard.at.utc < newest.record.declared_at;
-        let image = if is_older { sat.older.of(heard.at.utc) } else { sat.image.as_mut() };
-        let Some(image) = image else {
-            let message = format!(
-                "chunk {index} was heard before image {newest_id} was declared, and no image before it is known: kept raw"
-            );
+        if !heard.live && heard.at.utc < image.record.declared_at {
+            let message =
+                format!("chunk {index} was heard before image {} was declared: kept raw", image.record.id);
             self.kept_raw(heard, EventKind::ChunkReceived, Level::Watch, message);
             return;
-        };
+        }
         let was_complete = image.is_complete();
         let fit = image.fit(index, &chunk.data);
         let id = image.record.id;
@@ -354,10 +346,7 @@ impl Station {
             let message =
                 format!("image {id} is whole: {} bytes, {} conflicts", record.size_bytes, record.conflicts);
             self.event(heard.at.utc, EventKind::ImageComplete, Level::Normal, about, message);
-            // A download is of the newest image.
-            if !is_older {
-                self.end_download(heard.at, s, DownloadState::Complete, "its image is whole");
-            }
+            self.end_download(heard.at, s, DownloadState::Complete, "its image is whole");
         }
     }
 }

@@ -8,7 +8,6 @@ use super::contact::Contact;
 use super::image::Assembly;
 use super::journal::Journal;
 use super::link::Link;
-use super::older::Older;
 use super::outcome::mono_of;
 use super::recent::{Recent, Recents};
 use super::runner::{LastEnd, Run};
@@ -122,8 +121,6 @@ fn satellite(
     let commands: BTreeMap<CommandId, Command> =
         left.into_iter().flat_map(|l| &l.commands).map(|c| (c.record.id, command(c))).collect();
     let image = left.and_then(|l| l.image.as_ref()).map(Assembly::restore);
-    let older = left.into_iter().flat_map(|left| &left.older_images).map(Assembly::restore);
-    let older = Older::restore(older);
     let may_have_captured = |c: &&Command| {
         matches!(c.record.telecommand, protocol::Telecommand::CaptureImage { .. })
             && matches!(c.stage, Stage::Radiating | Stage::Radiated | Stage::Unknown)
@@ -150,7 +147,6 @@ fn satellite(
         exchange: Exchange::Idle,
         settling: Vec::new(),
         image,
-        older,
         captures,
         download,
         last_tag: left.and_then(|l| l.last_tag),

@@ -8,7 +8,6 @@ use protocol::{Answer, Counter, RequestTag, Telecommand};
 use super::contact::Contact;
 use super::image::Assembly;
 use super::journal::Ticket;
-use super::older::Older;
 use super::sealing::Sealer;
 use super::sky::Sky;
 use crate::clock::{MonoUs, Now, UtcUs};
@@ -192,7 +191,6 @@ pub(super) struct Satellite {
     pub(super) exchange: Exchange,
     pub(super) settling: Vec<Settling>,
     pub(super) image: Option<Assembly>,
-    pub(super) older: Older,
     /// These CaptureImages of ours may have been obeyed: the next ImageInfo declares a new image.
     pub(super) captures: BTreeSet<CommandId>,
     pub(super) download: Option<Download>,

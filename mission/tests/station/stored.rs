@@ -18,7 +18,7 @@ impl World {
         let mut commands: Vec<(CommandRecord, CommandSnapshot)> = Vec::new();
         let mut last_tag = None;
         let mut counter: Option<Counter> = None;
-        let mut images: Vec<ImageSnapshot> = Vec::new();
+        let mut image: Option<ImageSnapshot> = None;
         let mut downloads: Vec<DownloadRecord> = Vec::new();
         let mut elements = Vec::new();
         let mut of_others: std::collections::BTreeMap<mission::SatelliteId, Vec<ElementSet>> =
@@ -72,16 +72,16 @@ impl World {
                 Record::CounterFloor(row) => counter = counter.max(Some(row.counter)),
                 Record::Image(row) => {
                     ids.image = ids.image.max(row.id.0);
-                    match images.iter_mut().find(|held| held.record.id == row.id) {
-                        Some(held) => held.record = row.clone(),
-                        None => {
+                    match &mut image {
+                        Some(held) if held.record.id == row.id => held.record = row.clone(),
+                        _ => {
                             let record = row.clone();
-                            images.push(ImageSnapshot { record, chunks: Vec::new(), conflicts: Vec::new() });
+                            image = Some(ImageSnapshot { record, chunks: Vec::new(), conflicts: Vec::new() });
                         }
                     }
                 }
                 Record::Chunk(row) => {
-                    let image = images.iter_mut().find(|held| held.record.id == row.image).unwrap();
+                    let image = image.as_mut().filter(|held| held.record.id == row.image).unwrap();
                     if row.conflict {
                         image.conflicts.push(row.index);
                     } else {
@@ -105,8 +105,7 @@ impl World {
                 satellite: self.satellite.clone(),
                 last_tag,
                 commands: commands.into_iter().map(|(_, c)| c).filter(open).collect(),
-                image: images.pop(),
-                older_images: images.into_iter().rev().collect(),
+                image,
                 downloads,
                 limits: Vec::new(),
                 heartbeat: None,
@@ -119,7 +118,6 @@ impl World {
                 last_tag: None,
                 commands: Vec::new(),
                 image: None,
-                older_images: Vec::new(),
                 downloads: Vec::new(),
                 limits: Vec::new(),
                 heartbeat: None,
