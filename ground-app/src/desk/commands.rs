@@ -60,6 +60,9 @@ pub struct Asked {
     pub key: String,
     /// The request.
     pub request: CommandRequest,
+    /// Address of the server that was asked: the key means nothing to another one.
+    #[serde(default)]
+    pub server: String,
 }
 
 /// When a command may leave: as it is typed.
@@ -274,8 +277,9 @@ impl Draft {
     }
 
     /// Keeps what is asked for, under a key of its own.
-    pub fn ask(&mut self, request: CommandRequest) {
-        self.asked = Some(Asked { key: IdempotencyKey::fresh().as_str().to_owned(), request });
+    pub fn ask(&mut self, request: CommandRequest, server: &str) {
+        let (key, server) = (IdempotencyKey::fresh().as_str().to_owned(), server.to_owned());
+        self.asked = Some(Asked { key, request, server });
     }
 
     /// What must hold before it leaves.

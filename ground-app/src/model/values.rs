@@ -59,6 +59,12 @@ impl Values {
         Some(&self.held.get(satellite)?.get(parameter)?.points)
     }
 
+    /// The unit that came with that parameter.
+    #[must_use]
+    pub fn unit(&self, satellite: &str, parameter: &str) -> Option<&str> {
+        Some(&self.held.get(satellite)?.get(parameter)?.unit)
+    }
+
     /// Rises with each value of that parameter.
     #[must_use]
     pub fn revision(&self, satellite: &str, parameter: &str) -> u64 {

@@ -20,6 +20,9 @@ impl Scene<'_> {
             let ours = api::API_VERSION;
             return Err(format!("the server speaks version {} of the API, this window {ours}", version.api));
         }
+        if self.model.status.is_none() || self.now_us.is_none() {
+            return Err("the server has not said yet how the station is".to_owned());
+        }
         let Some(session) = self.model.session.value() else {
             return Err("the server has not said yet what you may do".to_owned());
         };

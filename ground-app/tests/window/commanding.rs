@@ -43,8 +43,13 @@ fn hold(seat: &mut Seat, label: &str, seconds: f32) {
 
 #[test]
 fn a_ping_is_sent_by_a_click_and_answered_with_its_stages_seen() {
-    let mut seat = Seat::take_with(SeatOptions { draws: true, ..SeatOptions::default() });
+    let mut seat = Seat::take_with(SeatOptions { draws: true, speed: Some(12.0), ..SeatOptions::default() });
     seat.until_in_pass();
+    // Low over the horizon much is lost.
+    let high = "2027-03-20T12:03:30Z".parse::<api::Time>().unwrap().unix_us();
+    seat.until("high in the sky", |seat| {
+        seat.model().clock.now_us(ground_app::clock::instant()).is_some_and(|now| now > high)
+    });
     open(&mut seat, "ping");
     seat.press(Key::Enter);
     assert_eq!(stages(&seat, "Ping"), [""; 0], "the palette sends nothing, and Enter neither");
@@ -109,14 +114,15 @@ fn a_click_without_an_answer_makes_one_command_however_often_it_is_asked_and_dra
     let mut draft = Draft::of("GetImageInfo");
     let request =
         serde_json::from_value(serde_json::json!({"command": "GetImageInfo", "gate": "blind"})).unwrap();
-    draft.asked = Some(Asked { key: "the-one-click".into(), request });
+    draft.asked = Some(Asked { key: "the-one-click".into(), request, server: server.address.clone() });
     desk.commands.open(draft);
     let text = serde_json::to_string(&desk).unwrap();
     let again = || serde_json::from_str::<Desk>(&text).unwrap();
     for _ in 0..2 {
         let mut seat = Seat::at(&server, SeatOptions { desk: again(), ..SeatOptions::default() });
         seat.until("connected", |seat| {
-            seat.model().session.value().is_some() && seat.model().connection.is_live()
+            let model = seat.model();
+            model.session.value().is_some() && model.status.is_some() && model.connection.is_live()
         });
         seat.press_with(Modifiers::COMMAND, Key::K);
         seat.type_into("Find", "commands");

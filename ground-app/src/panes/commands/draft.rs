@@ -21,11 +21,18 @@ const ARMED: Duration = Duration::from_secs(30);
 #[derive(Default)]
 pub(super) struct State {
     checked: Checked,
-    armed: Option<(Draft, Instant)>,
+    armed: Option<Armed>,
     hold: Hold,
     typed: TypedWord,
     template: String,
     find: String,
+}
+
+/// What may be fired: this very draft, to this satellite, until then.
+struct Armed {
+    draft: Draft,
+    target: String,
+    until: Instant,
 }
 
 pub(super) fn show(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Sender) {
@@ -259,7 +266,12 @@ fn fire(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
         can = can.and(Err("the fields above are not right yet".to_owned()));
     }
     let now = scene.now;
-    let is_same = |(armed, until): &(Draft, Instant)| armed == &*draft && *until > now;
+    let target = target(scene, draft);
+    if let Err(why) = &target {
+        can = can.and(Err(why.clone()));
+    }
+    let target = target.unwrap_or_default();
+    let is_same = |armed: &Armed| armed.draft == *draft && armed.target == target && armed.until > now;
     let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape));
     state.armed.take_if(|armed| !is_same(armed) || escaped || can.is_err());
     let mut go = false;
@@ -268,8 +280,8 @@ fn fire(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
             go = may::button(ui, format!("Send {name}"), &can);
             why(ui, &can);
         });
-    } else if let Some((_, until)) = state.armed {
-        let left = until.saturating_duration_since(now).as_secs();
+    } else if let Some(armed) = &state.armed {
+        let left = armed.until.saturating_duration_since(now).as_secs();
         let theme = Theme::current(ui);
         let two = if scene.needs_two() {
             " It asks a second person; nothing leaves before they approve."
@@ -277,7 +289,8 @@ fn fire(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
             ""
         };
         ui.label(
-            RichText::new(format!("{name} is armed for {left} s. Esc disarms.{two}")).color(theme.armed),
+            RichText::new(format!("{name} to {target} is armed for {left} s. Esc disarms.{two}"))
+                .color(theme.armed),
         );
         go |= hold_button(ui, &mut state.hold, &format!("Fire {name}"), theme.critical);
         go |= typed_word(ui, &mut state.typed, &name, &format!("Fire {name} by word"));
@@ -287,7 +300,8 @@ fn fire(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
     } else {
         ui.horizontal(|ui| {
             if may::button(ui, format!("Arm {name}"), &can) {
-                state.armed = Some((draft.clone(), now + ARMED));
+                state.armed =
+                    Some(Armed { draft: draft.clone(), target: target.clone(), until: now + ARMED });
                 (state.hold, state.typed) = (Hold::default(), TypedWord::default());
             }
             why(ui, &can);
@@ -295,14 +309,28 @@ fn fire(ui: &mut Ui, scene: &mut Scene<'_>, state: &mut State, sender: &mut Send
     }
     if go {
         state.armed = None;
-        let satellite = scene.satellite().map(|satellite| satellite.satellite.clone());
-        if let Some(request) = state.checked.request(satellite.as_deref(), scene.now_us) {
-            draft.ask(request);
+        if let Some(request) = state.checked.request(Some(&target), scene.now_us) {
+            draft.ask(request, &scene.model.address);
             if let Some(asked) = draft.asked.clone() {
                 sender.ask(scene.desk, asked);
                 scene.courier.wake();
             }
         }
+    }
+}
+
+/// To whom it goes: the satellite of the draft, else the one that is looked at. Never another one because that is not there.
+fn target(scene: &Scene<'_>, draft: &Draft) -> Result<String, String> {
+    if !draft.gate.satellite.is_empty() {
+        return Ok(draft.gate.satellite.clone());
+    }
+    let found = scene.satellite().map(|satellite| satellite.satellite.clone());
+    match (found, &scene.desk.satellite) {
+        (Some(found), Some(chosen)) if found != *chosen => {
+            Err(format!("this server has no satellite '{chosen}': choose one above"))
+        }
+        (Some(found), _) => Ok(found),
+        (None, _) => Err("the server has not said yet which satellites it has".to_owned()),
     }
 }
 
@@ -325,6 +353,12 @@ fn unanswered(
          stays one command."
     );
     ui.add(egui::Label::new(RichText::new(text).color(Theme::current(ui).distress)).wrap());
+    let elsewhere = asked.server != scene.model.address;
+    let can = if elsewhere {
+        &Err(format!("it was asked of the server at {}: ask there again, or let it be", asked.server))
+    } else {
+        can
+    };
     ui.horizontal_wrapped(|ui| {
         if may::button(ui, "Ask again", can) {
             sender.ask(scene.desk, asked.clone());

@@ -2,6 +2,7 @@
 //! answer it is asked again under the same key, so that a click makes one command however often it is asked.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
 
 use api::client::{Client, ClientError, IdempotencyKey};
 use api::{CommandRequest, GateWord, Outcome, OutcomeWord, ProblemKind};
@@ -12,6 +13,9 @@ use crate::link::Pending;
 
 /// Words that are kept on what came of clicks.
 const TOLD_MAX: usize = 20;
+/// A click on silence without an answer is asked again under its key for so long; then it is a new one, for the same key
+/// would be answered with what was done then, and nothing would be radiated. Off twice does no harm.
+const CEASE_AGAIN: Duration = Duration::from_secs(5);
 /// Requests that are remembered by the number of their command.
 const SENT_MAX: usize = 200;
 
@@ -35,8 +39,8 @@ pub(super) struct Sender {
     pub(super) told: VecDeque<Told>,
     /// What this window asked for, by the number of the command.
     pub(super) sent: BTreeMap<u64, CommandRequest>,
-    /// The last silence that was asked for and has no answer.
-    cease: Option<Asked>,
+    /// The last silence that was asked for and has no answer, and when.
+    cease: Option<(Asked, Instant)>,
 }
 
 impl Sender {
@@ -62,9 +66,13 @@ impl Sender {
     /// Silence: the satellite's transmitter off, at once, heard or not. A click without an answer is the same again.
     pub(super) fn cease(&mut self, scene: &mut Scene<'_>) {
         let satellite = scene.satellite().map(|satellite| satellite.satellite.clone());
-        let same = self.cease.take().filter(|asked| asked.request.satellite == satellite);
-        let asked = same.unwrap_or_else(|| Asked {
+        let now = scene.now;
+        let same = self.cease.take().filter(|(asked, at)| {
+            asked.request.satellite == satellite && now.saturating_duration_since(*at) < CEASE_AGAIN
+        });
+        let fresh = || Asked {
             key: IdempotencyKey::fresh().as_str().to_owned(),
+            server: scene.model.address.clone(),
             request: CommandRequest {
                 satellite,
                 link: None,
@@ -77,11 +85,12 @@ impl Sender {
                 attempts: None,
                 confirm: None,
             },
-        });
+        };
+        let (asked, at) = same.unwrap_or_else(|| (fresh(), now));
         if !self.is_asking(&asked.key) {
             self.next.push(asked.clone());
         }
-        self.cease = Some(asked);
+        self.cease = Some((asked, at));
     }
 
     /// Looks for answers, and sends what waits. Once a frame.
@@ -113,7 +122,8 @@ impl Sender {
                 (Ok(_), Some(request)) => {
                     // The old one cannot leave any more: a new one takes its place
                     let key = IdempotencyKey::fresh().as_str().to_owned();
-                    self.next.push(Asked { key, request });
+                    let server = scene.model.address.clone();
+                    self.next.push(Asked { key, request, server });
                     scene.courier.wake();
                 }
                 (Ok(_), None) => self.tell(true, format!("Command {id} is withdrawn"), BTreeMap::new()),
@@ -155,7 +165,7 @@ impl Sender {
             for draft in drafts.iter_mut().filter(|draft| draft.asked.as_ref() == Some(asked)) {
                 draft.asked = None;
             }
-            self.cease.take_if(|cease| cease == asked);
+            self.cease.take_if(|(cease, _)| cease == asked);
             scene.desk.is_urgent = true;
         }
     }
@@ -179,9 +189,11 @@ impl Sender {
 fn is_open(error: &ClientError) -> bool {
     match error {
         ClientError::NoAnswer { .. } | ClientError::Strange { .. } => true,
-        ClientError::Refused(_) => {
-            error.kind() == Some(ProblemKind::Internal) || error.kind() == Some(ProblemKind::StorageFailing)
-        }
+        // A server that stops may have taken it a moment before.
+        ClientError::Refused(_) => matches!(
+            error.kind(),
+            Some(ProblemKind::Internal | ProblemKind::StorageFailing | ProblemKind::Stopping)
+        ),
         ClientError::Address(_) | ClientError::Setup(_) => false,
     }
 }

@@ -281,7 +281,9 @@ fn plots(
 fn unit_of<'a>(scene: &Scene<'a>, satellite: &str, parameter: &str) -> &'a str {
     let parameters = scene.model.parameters.value().map_or(&[][..], |page| &page.items);
     let found = parameters.iter().find(|known| known.parameter == parameter && known.satellite == satellite);
-    found.map_or("", |known| &known.unit)
+    // A list of a minute ago does not have what came first since.
+    let live = || scene.model.values.unit(satellite, parameter);
+    found.map(|known| known.unit.as_str()).or_else(live).unwrap_or_default()
 }
 
 /// The parameters of a plot, each to be taken away, and one more to be added.
