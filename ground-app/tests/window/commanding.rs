@@ -119,7 +119,10 @@ fn a_click_without_an_answer_makes_one_command_however_often_it_is_asked_and_dra
     let text = serde_json::to_string(&desk).unwrap();
     let again = || serde_json::from_str::<Desk>(&text).unwrap();
     for _ in 0..2 {
-        let mut seat = Seat::at(&server, SeatOptions { desk: again(), ..SeatOptions::default() });
+        let mut seat = Seat::at(
+            &server,
+            SeatOptions { desk: again(), size: [1600.0, 1600.0], ..SeatOptions::default() },
+        );
         seat.until("connected", |seat| {
             let model = seat.model();
             model.session.value().is_some() && model.status.is_some() && model.connection.is_live()

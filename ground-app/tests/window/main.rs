@@ -2,7 +2,6 @@
 //! with the whole server: a topic is a module.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
 
-mod archive;
 mod commanding;
 mod common;
 mod frame;
