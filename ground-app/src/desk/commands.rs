@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn a_key_stays_until_an_answer_came_and_there_are_never_too_many_drafts() {
         let mut draft = Draft::of("Ping");
-        draft.ask(serde_json::from_value(json!({"command": "Ping"})).unwrap());
+        draft.ask(serde_json::from_value(json!({"command": "Ping"})).unwrap(), "http://127.0.0.1:8700");
         let kept: Draft = serde_json::from_str(&serde_json::to_string(&draft).unwrap()).unwrap();
         assert_eq!(kept, draft);
         let mut desk = CommandDesk::default();
